@@ -1,0 +1,67 @@
+//! What a user records: a folder with `dataset.toml` and images or corners, or both.
+
+use crate::board::BoardSpec;
+use crate::geometry::{PixelPoint, SensorSize};
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+/// A dataset as its manifest describes it; corners are loaded or detected separately.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dataset {
+    /// The folder that holds `dataset.toml`.
+    pub folder: PathBuf,
+    /// The calibration board.
+    pub board: BoardSpec,
+    /// One or more cameras, in the manifest's order.
+    pub cameras: Vec<CameraSpec>,
+    /// The rotation stage, if the manifest speaks of one. Without it poses are free.
+    pub stage: Option<StageSpec>,
+    /// Poses that the user leaves out.
+    pub excluded_poses: BTreeSet<usize>,
+}
+
+/// One camera of a dataset.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraSpec {
+    /// Unique in the dataset.
+    pub name: String,
+    /// Size of the sensor region that the images show.
+    pub sensor: SensorSize,
+    /// One entry per pose, in order; `None` where this camera has no image of the pose. Empty if
+    /// the dataset has corners only.
+    pub images: Vec<Option<PathBuf>>,
+}
+
+/// What is known about the rotation stage. Every part is optional and used for checks only.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct StageSpec {
+    /// Dial reading per pose, degrees.
+    pub angles_deg: Option<Vec<f64>>,
+    /// Stage placement per pose; poses of one placement share one axis.
+    pub placement: Option<Vec<usize>>,
+}
+
+/// One labelled corner in one image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Corner {
+    /// Row of the board, from 0.
+    pub row: usize,
+    /// Column of the board, from 0.
+    pub col: usize,
+    /// Where it was seen.
+    pub pixel: PixelPoint,
+    /// Standard deviation per axis, px, if the detector gave one.
+    pub sigma_px: Option<f64>,
+}
+
+/// The corners that one camera saw of one pose; at least one, in (row, col) order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct View {
+    /// Index into [`Dataset::cameras`].
+    pub camera_idx: usize,
+    /// The pose's number in the dataset (image order, or the `pose` column of `corners.csv`).
+    /// Numbers need not be contiguous.
+    pub pose: usize,
+    /// The corners seen.
+    pub corners: Vec<Corner>,
+}

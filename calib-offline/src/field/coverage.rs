@@ -1,0 +1,166 @@
+//! Which part of the sensor is calibrated: a mask of equal cells.
+
+use crate::geometry::{PixelPoint, SensorSize};
+use serde::{Deserialize, Serialize};
+
+/// The calibrated area as a grid of equal cells over the sensor, outer edge to outer edge.
+///
+/// A cell counts as calibrated if it touches the convex hull of the observed corners, so the
+/// margin beyond the hull is less than one cell.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CoverageMask {
+    /// The sensor that the mask covers.
+    pub sensor: SensorSize,
+    /// Cells along u.
+    pub cells_u: usize,
+    /// Cells along v.
+    pub cells_v: usize,
+    /// One flag per cell, row-major.
+    pub covered: Vec<bool>,
+}
+
+/// Cells along the longer side of the sensor.
+const CELLS_ALONG_LONGER_SIDE: f64 = 48.0;
+
+impl CoverageMask {
+    /// A mask in which every cell has the same value.
+    pub fn uniform(sensor: SensorSize, covered: bool) -> Self {
+        let cell_px = f64::from(sensor.width.max(sensor.height)) / CELLS_ALONG_LONGER_SIDE;
+        let cells = |extent: u32| ((f64::from(extent) / cell_px).round() as usize).max(1);
+        let (cells_u, cells_v) = (cells(sensor.width), cells(sensor.height));
+        Self {
+            sensor,
+            cells_u,
+            cells_v,
+            covered: vec![covered; cells_u * cells_v],
+        }
+    }
+
+    /// The mask of the convex hull of the observed corners.
+    pub fn from_corners(sensor: SensorSize, corners: impl Iterator<Item = PixelPoint>) -> Self {
+        let hull = convex_hull(corners.filter(|p| sensor.contains(*p)).collect());
+        let mut mask = Self::uniform(sensor, false);
+        let (width_px, height_px) = mask.cell_size_px();
+        for j in 0..mask.cells_v {
+            for i in 0..mask.cells_u {
+                let (u0, v0) = (i as f64 * width_px - 0.5, j as f64 * height_px - 0.5);
+                mask.covered[j * mask.cells_u + i] =
+                    rectangle_touches_hull([u0, v0, u0 + width_px, v0 + height_px], &hull);
+            }
+        }
+        mask
+    }
+
+    /// Width and height of a cell, px.
+    pub fn cell_size_px(&self) -> (f64, f64) {
+        (
+            f64::from(self.sensor.width) / self.cells_u as f64,
+            f64::from(self.sensor.height) / self.cells_v as f64,
+        )
+    }
+
+    /// Whether the pixel is in the calibrated area.
+    pub fn contains(&self, pixel: PixelPoint) -> bool {
+        if !self.sensor.contains(pixel) {
+            return false;
+        }
+        let (width_px, height_px) = self.cell_size_px();
+        let i = (((pixel.u + 0.5) / width_px) as usize).min(self.cells_u - 1);
+        let j = (((pixel.v + 0.5) / height_px) as usize).min(self.cells_v - 1);
+        self.covered[j * self.cells_u + i]
+    }
+
+    /// Share of the sensor that is calibrated, 0 to 1.
+    pub fn covered_share(&self) -> f64 {
+        self.covered.iter().filter(|c| **c).count() as f64 / self.covered.len() as f64
+    }
+}
+
+/// Convex hull, counterclockwise in (u, v) taken as a right-handed plane (Andrew's chain).
+pub fn convex_hull(mut points: Vec<PixelPoint>) -> Vec<PixelPoint> {
+    points.sort_by(|a, b| a.u.total_cmp(&b.u).then(a.v.total_cmp(&b.v)));
+    points.dedup();
+    if points.len() < 3 {
+        return points;
+    }
+    let turn = |a: PixelPoint, b: PixelPoint, c: PixelPoint| {
+        (b.u - a.u) * (c.v - a.v) - (b.v - a.v) * (c.u - a.u)
+    };
+    let chain = |points: &mut dyn Iterator<Item = PixelPoint>| {
+        let mut hull: Vec<PixelPoint> = Vec::new();
+        for p in points {
+            while let [.., a, b] = hull[..]
+                && turn(a, b, p) <= 0.0
+            {
+                hull.pop();
+            }
+            hull.push(p);
+        }
+        hull.pop();
+        hull
+    };
+    let mut hull = chain(&mut points.iter().copied());
+    hull.extend(chain(&mut points.iter().rev().copied()));
+    hull
+}
+
+/// Separating-axis test between an axis-aligned rectangle `[u0, v0, u1, v1]` and a convex polygon.
+fn rectangle_touches_hull([u0, v0, u1, v1]: [f64; 4], hull: &[PixelPoint]) -> bool {
+    if hull.is_empty()
+        || hull.iter().all(|p| p.u < u0)
+        || hull.iter().all(|p| p.u > u1)
+        || hull.iter().all(|p| p.v < v0)
+        || hull.iter().all(|p| p.v > v1)
+    {
+        return false;
+    }
+    let corners = [(u0, v0), (u1, v0), (u1, v1), (u0, v1)];
+    (0..hull.len()).all(|k| {
+        let (a, b) = (hull[k], hull[(k + 1) % hull.len()]);
+        corners
+            .iter()
+            .any(|(u, v)| (b.u - a.u) * (v - a.v) - (b.v - a.v) * (u - a.u) >= 0.0)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hull_of_a_square_with_inner_points_is_the_square() {
+        let mut points = vec![];
+        for u in 0..5 {
+            for v in 0..5 {
+                points.push(PixelPoint::new(f64::from(u), f64::from(v)));
+            }
+        }
+        let hull = convex_hull(points);
+        assert_eq!(
+            hull,
+            [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)].map(|(u, v)| PixelPoint::new(u, v))
+        );
+    }
+
+    #[test]
+    fn everything_inside_the_hull_is_answered_and_far_outside_is_not() {
+        let sensor = SensorSize::new(640, 480);
+        let triangle = [(100.0, 100.0), (500.0, 120.0), (300.0, 400.0)];
+        let mask = CoverageMask::from_corners(
+            sensor,
+            triangle.iter().map(|(u, v)| PixelPoint::new(*u, *v)),
+        );
+        for (a, b) in [(0.2, 0.3), (0.0, 0.5), (0.98, 0.01), (0.33, 0.33)] {
+            let c = 1.0 - a - b;
+            let weights = [a, b, c];
+            let mix = |f: fn(&(f64, f64)) -> f64| -> f64 {
+                triangle.iter().zip(weights).map(|(p, w)| f(p) * w).sum()
+            };
+            assert!(mask.contains(PixelPoint::new(mix(|p| p.0), mix(|p| p.1))));
+        }
+        let margin = mask.cell_size_px().0.max(mask.cell_size_px().1) * 1.5;
+        assert!(!mask.contains(PixelPoint::new(300.0, 100.0 - margin)));
+        assert!(!mask.contains(PixelPoint::new(10.0, 470.0)));
+        assert!(!mask.contains(PixelPoint::new(-1.0, 100.0)));
+    }
+}

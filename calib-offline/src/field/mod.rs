@@ -1,0 +1,12 @@
+//! The ray field: for every pixel a line in space, with no assumption that the lines meet.
+
+pub mod coverage;
+pub mod polynomial;
+pub mod ray_field;
+pub mod rig;
+pub mod spline;
+pub mod transport;
+
+pub use coverage::CoverageMask;
+pub use ray_field::{BaseLens, FieldSample, Projection, RayField, SmoothMap};
+pub use rig::{CalibratedCamera, MeasureError, Rig};

@@ -1,0 +1,15 @@
+//! Pure geometry: rotations, rigid transforms, rays, triangulation. No files, no estimation.
+//!
+//! Lengths are millimeters, angles radians. `a_from_b` maps coordinates in frame b to coordinates
+//! in frame a, so products chain by eye: `left_from_datum * datum_from_board`.
+
+pub mod pixel;
+pub mod ray;
+pub mod se3;
+pub mod so3;
+pub mod triangulation;
+
+pub use pixel::{PixelPoint, SensorSize};
+pub use ray::Ray;
+pub use se3::RigidTransform;
+pub use triangulation::{TriangulateError, Triangulation, triangulate_pair, triangulate_rays};

@@ -1,0 +1,99 @@
+//! Rigid transforms between two named frames.
+
+use super::so3;
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// `point_in_a = rotation * point_in_b + translation_mm`; a variable of this type is named
+/// `a_from_b`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RigidTransform {
+    /// Proper orthonormal; column k is axis k of frame b seen in frame a.
+    pub rotation: Matrix3<f64>,
+    /// Origin of frame b seen in frame a, mm.
+    pub translation_mm: Vector3<f64>,
+}
+
+impl RigidTransform {
+    /// The transform that changes nothing.
+    pub fn identity() -> Self {
+        Self::new(Matrix3::identity(), Vector3::zeros())
+    }
+
+    /// From a rotation and a translation, mm.
+    pub fn new(rotation: Matrix3<f64>, translation_mm: Vector3<f64>) -> Self {
+        Self {
+            rotation,
+            translation_mm,
+        }
+    }
+
+    /// The point in frame a, mm.
+    pub fn point(&self, point_in_b: &Vector3<f64>) -> Vector3<f64> {
+        self.rotation * point_in_b + self.translation_mm
+    }
+
+    /// The direction in frame a.
+    pub fn direction(&self, direction_in_b: &Vector3<f64>) -> Vector3<f64> {
+        self.rotation * direction_in_b
+    }
+
+    /// `b_from_a`.
+    pub fn inverse(&self) -> Self {
+        let rotation = self.rotation.transpose();
+        Self::new(rotation, -(rotation * self.translation_mm))
+    }
+
+    /// The update `R <- Exp(phi) R, t <- t + tau`: rotation vector rad, translation mm.
+    ///
+    /// The translation is not turned by `phi`, which keeps the two apart in the normal equations.
+    pub fn perturbed(&self, phi_rad: &Vector3<f64>, tau_mm: &Vector3<f64>) -> Self {
+        Self::new(
+            so3::exp(phi_rad) * self.rotation,
+            self.translation_mm + tau_mm,
+        )
+    }
+
+    /// The same transform with its rotation made orthonormal to round-off.
+    pub fn orthonormalized(&self) -> Self {
+        Self::new(
+            so3::nearest_rotation(&self.rotation).unwrap_or(self.rotation),
+            self.translation_mm,
+        )
+    }
+}
+
+impl std::ops::Mul for RigidTransform {
+    type Output = RigidTransform;
+
+    /// `a_from_b * b_from_c = a_from_c`.
+    fn mul(self, rhs: RigidTransform) -> RigidTransform {
+        RigidTransform::new(
+            self.rotation * rhs.rotation,
+            self.rotation * rhs.translation_mm + self.translation_mm,
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_chain_and_inverses_cancel() {
+        let a_from_b = RigidTransform::new(
+            so3::exp(&Vector3::new(0.1, 0.7, -0.3)),
+            Vector3::new(1.0, 2.0, 3.0),
+        );
+        let b_from_c = RigidTransform::new(
+            so3::exp(&Vector3::new(-0.4, 0.2, 0.9)),
+            Vector3::new(-5.0, 0.5, 2.0),
+        );
+        let point_in_c = Vector3::new(3.0, -1.0, 0.25);
+        let chained = (a_from_b * b_from_c).point(&point_in_c);
+        let stepwise = a_from_b.point(&b_from_c.point(&point_in_c));
+        assert!((chained - stepwise).norm() < 1e-14);
+        let back = a_from_b.inverse().point(&a_from_b.point(&point_in_c));
+        assert!((back - point_in_c).norm() < 1e-14);
+    }
+}

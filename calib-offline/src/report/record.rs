@@ -1,0 +1,156 @@
+//! `calibration.json`: everything a calibration found, versioned, enough to draw every figure again.
+
+use crate::board::BoardSpec;
+use crate::field::Rig;
+use crate::geometry::{PixelPoint, RigidTransform};
+use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
+
+/// Name and version of the format.
+pub const SCHEMA: &str = "calib-offline/calibration/1";
+
+/// The whole result of `calibrate`.
+///
+/// Millimeters; the center of the top-left pixel is (0, 0); `a_from_b` maps coordinates in b to
+/// coordinates in a. The rig frame is the board frame at the datum pose.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Calibration {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// Version of the program that wrote the file.
+    pub tool_version: String,
+    /// `joint` or `alternating`.
+    pub method: String,
+    /// SHA-256 of the manifest and of the corners that went in, hex. With the tool's version it
+    /// identifies the calibration.
+    pub input_sha256: String,
+    /// The board as the manifest describes it.
+    pub board: BoardSpec,
+    /// Out-of-plane shape found for the board.
+    pub board_shape: BoardShape,
+    /// The calibrated cameras.
+    pub rig: Rig,
+    /// Every pose used.
+    pub poses: Vec<PoseRecord>,
+    /// Every corner offered to the estimate.
+    pub corners: Vec<CornerRecord>,
+    /// What was left out, and why.
+    pub left_out: Vec<LeftOut>,
+    /// How the estimate went.
+    pub estimate: EstimateRecord,
+    /// Held-out check; `None` if there were too few poses for one.
+    pub held_out: Option<HeldOutRecord>,
+    /// The judgement.
+    pub verdict: Verdict,
+}
+
+/// `z(X, Y)` of the board: Legendre products over the corners' extent (x and y from -1 at the
+/// first to 1 at the last corner), total degree 2.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct BoardShape {
+    /// Powers (i, j) and coefficient, mm.
+    pub terms: Vec<(usize, usize, f64)>,
+}
+
+/// One pose of the board.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PoseRecord {
+    /// Its number in the dataset.
+    pub pose: usize,
+    /// Where the board was.
+    pub rig_from_board: RigidTransform,
+    /// RMS of the residual vectors per camera, px, in the rig's camera order; `None` where the
+    /// camera did not see the pose.
+    pub rms_px: Vec<Option<f64>>,
+    /// Dial reading, if the dataset has one.
+    pub stage_angle_deg: Option<f64>,
+}
+
+/// One corner offered to the estimate.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CornerRecord {
+    /// Index into the rig's cameras.
+    pub camera_idx: usize,
+    /// Number of the pose in the dataset.
+    pub pose: usize,
+    /// Row on the board.
+    pub row: usize,
+    /// Column on the board.
+    pub col: usize,
+    /// Where it was seen.
+    pub observed: PixelPoint,
+    /// Observed minus predicted, px (to first order, see `joint::residual`).
+    pub residual_px: Vector2<f64>,
+    /// Robust weight, 0 to 1; 0 is a rejected corner.
+    pub weight: f64,
+}
+
+/// Something that did not go into the estimate.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// Number of the pose.
+    pub pose: usize,
+    /// Name of the camera; `None` if the pose was left out for all.
+    pub camera: Option<String>,
+    /// Number of corners concerned.
+    pub corner_count: usize,
+    /// In words.
+    pub reason: String,
+}
+
+/// How the estimate went.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EstimateRecord {
+    /// Cost after each accepted step.
+    pub cost_per_iteration: Vec<f64>,
+    /// Why it stopped, in words.
+    pub stop_reason: String,
+    /// Standard deviation of the corner noise per axis, px, robust estimate.
+    pub sigma_px: f64,
+    /// RMS of the residual vectors of the corners used, px.
+    pub rms_px: f64,
+    /// Corners used.
+    pub corners_used: usize,
+    /// Corners rejected as outliers.
+    pub corners_rejected: usize,
+}
+
+/// Boards the estimate never saw, measured with the rig.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HeldOutRecord {
+    /// Number of folds; poses are dealt to folds in turn.
+    pub folds: usize,
+    /// RMS residual vector of the held-out corners, board pose refitted, px.
+    pub rms_px: Option<f64>,
+    /// Median of the same.
+    pub median_px: Option<f64>,
+    /// RMS error of the distance between neighboring corners, percent of the square; stereo only.
+    pub neighbor_rms_percent: Option<f64>,
+    /// RMS distance of the triangulated corners from the best-placed board, mm; stereo only.
+    pub rigid_rms_mm: Option<f64>,
+    /// Triangulated corners behind the two figures above.
+    pub point_count: usize,
+    /// Held-out corners outside the calibrated area of their fold, for which nothing was measured.
+    pub outside_count: usize,
+}
+
+/// The judgement with its reasons.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// The grade.
+    pub grade: Grade,
+    /// Each with its figure and threshold.
+    pub reasons: Vec<String>,
+}
+
+/// Pass, doubtful or fail.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Grade {
+    /// Nothing speaks against it.
+    Pass,
+    /// Usable with care: see the reasons.
+    Doubtful,
+    /// Not usable: see the reasons.
+    Fail,
+}

@@ -1,0 +1,2 @@
+//! Device.
+#![cfg_attr(not(feature = "std"), no_std)]
