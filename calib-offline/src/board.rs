@@ -61,6 +61,58 @@ impl BoardSpec {
     }
 }
 
+/// Out-of-plane shape `z(X, Y)` of a board: Legendre products over the corners' extent, x and y
+/// from -1 at the first to 1 at the last corner. A flat board has no term.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct BoardShape {
+    /// Powers (i, j) and coefficient, mm.
+    pub terms: Vec<(usize, usize, f64)>,
+}
+
+impl BoardShape {
+    /// The shape of total degree 2 with all coefficients zero: bow along x, twist, bow along y.
+    /// Lower degrees are poses, not shape.
+    pub fn flat_of_degree_two() -> Self {
+        Self {
+            terms: vec![(2, 0, 0.0), (1, 1, 0.0), (0, 2, 0.0)],
+        }
+    }
+
+    /// Value of each term's product (without its coefficient) at a point of the board.
+    pub fn products<'a>(
+        &'a self,
+        board: &BoardSpec,
+        point_in_board: &Vector3<f64>,
+    ) -> impl Iterator<Item = f64> + 'a {
+        let (width_mm, height_mm) = board.extent_mm();
+        let x = 2.0 * point_in_board.x / width_mm - 1.0;
+        let y = 2.0 * point_in_board.y / height_mm - 1.0;
+        self.terms
+            .iter()
+            .map(move |&(i, j, _)| legendre(i, x) * legendre(j, y))
+    }
+
+    /// Height of the board's face along its z axis, mm.
+    pub fn height_mm(&self, board: &BoardSpec, point_in_board: &Vector3<f64>) -> f64 {
+        self.products(board, point_in_board)
+            .zip(&self.terms)
+            .map(|(product, (_, _, coefficient))| product * coefficient)
+            .sum()
+    }
+}
+
+/// Legendre polynomial of degree `n`, by recurrence.
+fn legendre(n: usize, x: f64) -> f64 {
+    let (mut previous, mut current) = (0.0, 1.0);
+    for k in 0..n {
+        let kf = k as f64;
+        let next = ((2.0 * kf + 1.0) * x * current - kf * previous) / (kf + 1.0);
+        previous = current;
+        current = next;
+    }
+    current
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -92,5 +144,14 @@ mod tests {
             .looks_same_after_half_turn()
         );
         assert_eq!(BOARD.half_turned(0, 12), (14, 0));
+    }
+
+    #[test]
+    fn bow_is_one_at_the_edges_and_minus_half_in_the_middle() {
+        let shape = BoardShape {
+            terms: vec![(2, 0, 0.3)],
+        };
+        assert!((shape.height_mm(&BOARD, &BOARD.corner_in_board(0, 12)) - 0.3).abs() < 1e-15);
+        assert!((shape.height_mm(&BOARD, &BOARD.center_in_board()) + 0.15).abs() < 1e-15);
     }
 }

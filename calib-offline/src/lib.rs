@@ -1,7 +1,9 @@
 //! Camera calibration with one ray per pixel, from a chessboard on a rotation stage.
 
+pub mod adjust;
 pub mod board;
 pub mod dataset;
 pub mod field;
 pub mod geometry;
+pub mod init;
 pub mod report;

@@ -5,6 +5,7 @@ pub mod polynomial;
 pub mod ray_field;
 pub mod rig;
 pub mod spline;
+pub mod structured;
 pub mod transport;
 
 pub use coverage::CoverageMask;

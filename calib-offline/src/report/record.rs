@@ -1,5 +1,6 @@
 //! `calibration.json`: everything a calibration found, versioned, enough to draw every figure again.
 
+pub use crate::board::BoardShape;
 use crate::board::BoardSpec;
 use crate::field::Rig;
 use crate::geometry::{PixelPoint, RigidTransform};
@@ -42,14 +43,6 @@ pub struct Calibration {
     pub held_out: Option<HeldOutRecord>,
     /// The judgement.
     pub verdict: Verdict,
-}
-
-/// `z(X, Y)` of the board: Legendre products over the corners' extent (x and y from -1 at the
-/// first to 1 at the last corner), total degree 2.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct BoardShape {
-    /// Powers (i, j) and coefficient, mm.
-    pub terms: Vec<(usize, usize, f64)>,
 }
 
 /// One pose of the board.

@@ -1,0 +1,14 @@
+//! Adjustment: ray fields, poses, extrinsics and board shape moved together until the residuals
+//! are smallest. Initialization uses it on a few boards of one camera, the joint estimate on
+//! everything.
+
+pub mod levenberg;
+pub mod model;
+pub mod normal_equations;
+pub mod observations;
+pub mod residual;
+pub mod robust;
+
+pub use levenberg::{Outcome, StopReason};
+pub use model::{CameraModel, Model};
+pub use observations::Observations;

@@ -1,0 +1,183 @@
+//! What was seen, arranged for adjustment: one block per view, with everything that does not
+//! change while parameters move computed once.
+
+use crate::board::BoardSpec;
+use crate::dataset::View;
+use crate::field::{BaseLens, polynomial};
+use crate::geometry::{PixelPoint, SensorSize};
+use nalgebra::{DMatrix, Matrix2, Vector2, Vector3};
+
+/// All views offered to an adjustment.
+#[derive(Debug, Clone)]
+pub struct Observations {
+    /// The board.
+    pub board: BoardSpec,
+    /// Sensor per camera.
+    pub sensors: Vec<SensorSize>,
+    /// Numbers of the poses, rising; a pose's index here is its index everywhere in `adjust`.
+    pub poses: Vec<usize>,
+    /// One block per view, in (camera, pose) order.
+    pub views: Vec<ViewBlock>,
+}
+
+/// The corners that one camera saw of one pose.
+#[derive(Debug, Clone)]
+pub struct ViewBlock {
+    /// Index of the camera.
+    pub camera_idx: usize,
+    /// Index into [`Observations::poses`].
+    pub pose_idx: usize,
+    /// The corners.
+    pub corners: Vec<ObservedCorner>,
+}
+
+/// One corner of one view.
+#[derive(Debug, Clone, Copy)]
+pub struct ObservedCorner {
+    /// Row on the board.
+    pub row: usize,
+    /// Column on the board.
+    pub col: usize,
+    /// Nominal position, board frame, mm.
+    pub point_in_board: Vector3<f64>,
+    /// Where it was seen.
+    pub pixel: PixelPoint,
+    /// Inverse variance relative to the typical corner of the dataset.
+    pub relative_weight: f64,
+}
+
+impl Observations {
+    /// Arranges views. `sensors` are those of all cameras, whether they have views or not.
+    pub fn new(board: BoardSpec, sensors: Vec<SensorSize>, views: &[View]) -> Self {
+        let mut poses: Vec<usize> = views.iter().map(|view| view.pose).collect();
+        poses.sort_unstable();
+        poses.dedup();
+        let typical_sigma_px = median_sigma_px(views);
+        let mut blocks: Vec<ViewBlock> = views
+            .iter()
+            .filter_map(|view| {
+                let pose_idx = poses.binary_search(&view.pose).ok()?;
+                let corners = view
+                    .corners
+                    .iter()
+                    .map(|corner| ObservedCorner {
+                        row: corner.row,
+                        col: corner.col,
+                        point_in_board: board.corner_in_board(corner.row, corner.col),
+                        pixel: corner.pixel,
+                        relative_weight: corner
+                            .sigma_px
+                            .map_or(1.0, |sigma_px| (typical_sigma_px / sigma_px).powi(2)),
+                    })
+                    .collect();
+                Some(ViewBlock {
+                    camera_idx: view.camera_idx,
+                    pose_idx,
+                    corners,
+                })
+            })
+            .collect();
+        blocks.sort_by_key(|block| (block.camera_idx, block.pose_idx));
+        Self {
+            board,
+            sensors,
+            poses,
+            views: blocks,
+        }
+    }
+
+    /// Number of corners in all views.
+    pub fn corner_count(&self) -> usize {
+        self.views.iter().map(|view| view.corners.len()).sum()
+    }
+
+    /// The views of some poses only, with poses renumbered.
+    pub fn with_poses(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let kept: Vec<usize> = (0..self.poses.len())
+            .filter(|idx| keep(self.poses[*idx]))
+            .collect();
+        let views = self
+            .views
+            .iter()
+            .filter_map(|view| {
+                let pose_idx = kept.binary_search(&view.pose_idx).ok()?;
+                Some(ViewBlock {
+                    pose_idx,
+                    ..view.clone()
+                })
+            })
+            .collect();
+        Self {
+            board: self.board,
+            sensors: self.sensors.clone(),
+            poses: kept.iter().map(|idx| self.poses[*idx]).collect(),
+            views,
+        }
+    }
+
+    /// The views of one camera only, as camera 0; poses it did not see are dropped.
+    pub fn of_camera(&self, camera_idx: usize) -> Self {
+        let seen: Vec<usize> = self
+            .views
+            .iter()
+            .filter(|view| view.camera_idx == camera_idx)
+            .map(|view| self.poses[view.pose_idx])
+            .collect();
+        let mut selected = self.with_poses(|pose| seen.contains(&pose));
+        selected.views.retain(|view| view.camera_idx == camera_idx);
+        for view in &mut selected.views {
+            view.camera_idx = 0;
+        }
+        selected.sensors = vec![self.sensors[camera_idx]];
+        selected
+    }
+}
+
+/// Median of the corners' own standard deviations, px; 1 if none has one.
+fn median_sigma_px(views: &[View]) -> f64 {
+    let mut sigmas: Vec<f64> = views
+        .iter()
+        .flat_map(|view| view.corners.iter().filter_map(|corner| corner.sigma_px))
+        .collect();
+    sigmas.sort_by(f64::total_cmp);
+    sigmas.get(sigmas.len() / 2).copied().unwrap_or(1.0)
+}
+
+/// The values of the fixed functions at the corners of one view: base lens and Legendre products.
+#[derive(Debug, Clone)]
+pub struct ViewBasis {
+    /// Base lens at each corner: half-angle vector and derivative per px.
+    pub base: Vec<(Vector2<f64>, Matrix2<f64>)>,
+    /// Products, one row per corner.
+    pub products: DMatrix<f64>,
+    /// Their derivatives by u, 1/px.
+    pub products_du: DMatrix<f64>,
+    /// Their derivatives by v, 1/px.
+    pub products_dv: DMatrix<f64>,
+}
+
+impl ViewBasis {
+    /// Evaluates the fixed functions at the corners of a view.
+    pub fn new(view: &ViewBlock, sensor: SensorSize, base: BaseLens, degree: usize) -> Self {
+        let (n, k) = (view.corners.len(), polynomial::term_count(degree));
+        let mut basis = Self {
+            base: Vec::with_capacity(n),
+            products: DMatrix::zeros(n, k),
+            products_du: DMatrix::zeros(n, k),
+            products_dv: DMatrix::zeros(n, k),
+        };
+        let center = sensor.center();
+        let mut row = Vec::with_capacity(k);
+        for (r, corner) in view.corners.iter().enumerate() {
+            let offset = Vector2::new(corner.pixel.u - center.u, corner.pixel.v - center.v);
+            basis.base.push(base.evaluate(&offset));
+            polynomial::basis(sensor, degree, corner.pixel, &mut row);
+            for (c, [value, du, dv]) in row.iter().enumerate() {
+                basis.products[(r, c)] = *value;
+                basis.products_du[(r, c)] = *du;
+                basis.products_dv[(r, c)] = *dv;
+            }
+        }
+        basis
+    }
+}

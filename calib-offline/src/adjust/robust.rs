@@ -1,0 +1,185 @@
+//! How much a residual counts: weights of a bivariate Student-t distribution (METHOD 9A).
+//!
+//! Real corners have heavier tails than a Gaussian; simulated ones do not. The number of degrees
+//! of freedom comes from the residuals' own likelihood, so that Gaussian noise costs nothing.
+
+use super::normal_equations::Weights;
+use super::observations::Observations;
+use nalgebra::Vector2;
+
+/// Degrees of freedom that are tried; the last is least squares to all practical purposes.
+const CANDIDATES: [f64; 6] = [3.0, 4.0, 6.0, 10.0, 20.0, 1000.0];
+
+/// A residual beyond this many standard deviations is no corner, whatever the tails.
+const REJECT_BEYOND_SIGMA: f64 = 8.0;
+
+/// The distribution of residual vectors: `p(r) ~ (1 + |r|^2 / (nu v))^(-(nu + 2) / 2)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StudentT {
+    /// Degrees of freedom nu.
+    pub freedom: f64,
+    /// Scale v, px^2 per axis.
+    pub variance_px2: f64,
+}
+
+impl StudentT {
+    /// Weight of a residual whose squared length is `squared_px2`, and 0 beyond the rejection
+    /// limit.
+    pub fn weight(&self, squared_px2: f64) -> f64 {
+        let ratio = squared_px2 / self.variance_px2;
+        if ratio > REJECT_BEYOND_SIGMA * REJECT_BEYOND_SIGMA {
+            0.0
+        } else {
+            (self.freedom + 2.0) / (self.freedom + ratio)
+        }
+    }
+
+    /// The distribution, of those tried, that makes the residuals most likely. `squared_px2` are
+    /// the squared lengths of residual vectors; at least `floor_px2` per axis is assumed, so that
+    /// noise-free data have a scale.
+    pub fn fit(squared_px2: &[f64], floor_px2: f64) -> Self {
+        let mut best: Option<(f64, Self)> = None;
+        let robust_start = {
+            let mut sorted = squared_px2.to_vec();
+            sorted.sort_by(f64::total_cmp);
+            // The median of |r|^2 of a bivariate Gaussian is 2 ln 2 times its variance per axis.
+            sorted.get(sorted.len() / 2).copied().unwrap_or(0.0) / (2.0 * 2f64.ln())
+        }
+        .max(floor_px2);
+        for freedom in CANDIDATES {
+            let mut fit = Self {
+                freedom,
+                variance_px2: robust_start,
+            };
+            let mut kept = 0.0;
+            for _ in 0..30 {
+                let (mut weighted, mut count) = (0.0, 0.0);
+                for s in squared_px2 {
+                    let w = fit.weight(*s);
+                    if w > 0.0 {
+                        weighted += w * s;
+                        count += 1.0;
+                    }
+                }
+                kept = count;
+                if count == 0.0 {
+                    break;
+                }
+                let variance_px2 = (weighted / (2.0 * count)).max(floor_px2);
+                let change = (variance_px2 / fit.variance_px2).ln().abs();
+                fit.variance_px2 = variance_px2;
+                if change < 1e-6 {
+                    break;
+                }
+            }
+            // Log likelihood per kept residual; all candidates normalize alike:
+            // ln p = -ln(2 pi v) - (nu + 2)/2 ln(1 + |r|^2/(nu v)).
+            let log_likelihood = squared_px2
+                .iter()
+                .filter(|s| fit.weight(**s) > 0.0)
+                .map(|s| {
+                    -fit.variance_px2.ln()
+                        - (freedom + 2.0) / 2.0 * (s / (freedom * fit.variance_px2)).ln_1p()
+                })
+                .sum::<f64>()
+                // A rejected residual counts as one at the limit, so that rejecting is never free.
+                - (squared_px2.len() as f64 - kept)
+                    * (fit.variance_px2.ln()
+                        + (freedom + 2.0) / 2.0
+                            * (REJECT_BEYOND_SIGMA * REJECT_BEYOND_SIGMA / freedom).ln_1p());
+            if best.is_none_or(|(likelihood, _)| log_likelihood > likelihood) {
+                best = Some((log_likelihood, fit));
+            }
+        }
+        best.map_or(
+            Self {
+                freedom: CANDIDATES[1],
+                variance_px2: robust_start,
+            },
+            |(_, fit)| fit,
+        )
+    }
+}
+
+/// The scale of residuals that counts as noise-free, px: 1/500 of what the best detectors reach.
+const FLOOR_PX: f64 = 2e-5;
+
+/// The distribution of the residuals, and the weight in 1/px^2 that it gives to every corner.
+///
+/// A corner behind its camera gets weight 0. `strength` scales all weights: 1 for independent
+/// corners, less if neighboring corners err alike.
+pub fn reweight(
+    residuals: &[Vec<Option<Vector2<f64>>>],
+    observations: &Observations,
+    strength: f64,
+) -> (StudentT, Weights) {
+    let squared: Vec<Vec<Option<f64>>> = residuals
+        .iter()
+        .zip(&observations.views)
+        .map(|(residuals, view)| {
+            residuals
+                .iter()
+                .zip(&view.corners)
+                .map(|(residual, corner)| {
+                    let squared = residual.as_ref()?.norm_squared() * corner.relative_weight;
+                    squared.is_finite().then_some(squared)
+                })
+                .collect()
+        })
+        .collect();
+    let flat: Vec<f64> = squared.iter().flatten().filter_map(|s| *s).collect();
+    let noise = StudentT::fit(&flat, FLOOR_PX * FLOOR_PX);
+    let weights = squared
+        .iter()
+        .zip(&observations.views)
+        .map(|(squared, view)| {
+            squared
+                .iter()
+                .zip(&view.corners)
+                .map(|(squared, corner)| {
+                    squared.map_or(0.0, |s| {
+                        strength * noise.weight(s) * corner.relative_weight / noise.variance_px2
+                    })
+                })
+                .collect()
+        })
+        .collect();
+    (noise, weights)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    fn gaussian(count: usize, sigma: f64) -> Vec<f64> {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+        (0..count)
+            .map(|_| {
+                let x: f64 = StandardNormal.sample(&mut rng);
+                let y: f64 = StandardNormal.sample(&mut rng);
+                sigma * sigma * (x * x + y * y)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn gaussian_residuals_are_least_squares() {
+        let fit = StudentT::fit(&gaussian(5000, 0.05), 1e-12);
+        assert!(fit.freedom >= 20.0, "nu = {}", fit.freedom);
+        // Standard error of a standard deviation from 10^4 numbers: 0.7 %.
+        assert!((fit.variance_px2.sqrt() / 0.05 - 1.0).abs() < 0.03);
+    }
+
+    #[test]
+    fn outliers_do_not_move_the_scale() {
+        let mut squared = gaussian(5000, 0.05);
+        for s in squared.iter_mut().step_by(20) {
+            *s = 25.0;
+        }
+        let fit = StudentT::fit(&squared, 1e-12);
+        assert_eq!(fit.weight(25.0), 0.0);
+        assert!((fit.variance_px2.sqrt() / 0.05 - 1.0).abs() < 0.1);
+    }
+}

@@ -1,0 +1,410 @@
+//! The polynomial directions a lens is expected to use, and the rest by degree.
+//!
+//! A free polynomial of degree 7 has 72 coefficients; few views cannot hold them all. So its space
+//! is split (METHOD 9A): a *structured* span that every lens may use freely (affine map, three
+//! radial terms, decentering, tilt of the sensor, shift of the distortion's center), and for each
+//! degree the remaining directions, which a smoothness weight holds back as far as the evidence
+//! asks for it. All directions are orthonormal over the sensor, so a coefficient is the RMS
+//! change of the half-angle vector that it makes.
+
+use super::polynomial::{self, Polynomial};
+use super::ray_field::BaseLens;
+use crate::geometry::{PixelPoint, SensorSize};
+use nalgebra::{DMatrix, DVector, Vector2};
+
+/// Directions of the first kind that rotate the camera frame (two shifts of the center's
+/// direction, one turn about the axis): they are held, as poses and extrinsics can do the same.
+const GAUGE_DIRECTIONS: usize = 3;
+
+/// Lattice nodes along the longer side, for inner products over the sensor.
+const LATTICE: usize = 33;
+
+/// A basis of the polynomial part of a direction field.
+#[derive(Debug, Clone)]
+pub struct StructuredBasis {
+    /// Total degree of the underlying Legendre products.
+    pub degree: usize,
+    /// Columns: directions in Legendre coefficients, `2 k + component`.
+    coefficients: DMatrix<f64>,
+    /// Rows: the linear form that reads a direction's amount from Legendre coefficients.
+    dual: DMatrix<f64>,
+    /// Per direction: `None` if free, else the degree whose smoothness weight holds it.
+    penalized_degree: Vec<Option<usize>>,
+}
+
+impl StructuredBasis {
+    /// The basis over a sensor. `profile` is the radial profile found so far: with it, the two
+    /// directions that shift the center of the whole radial mapping are free too.
+    pub fn new(sensor: SensorSize, degree: usize, profile: Option<&RadialProfile>) -> Self {
+        let lattice = Lattice::new(sensor, degree);
+        let terms: Vec<(usize, usize)> = polynomial::terms(degree).collect();
+        let mut builder = Builder {
+            lattice: &lattice,
+            orthonormal: Vec::new(),
+            penalized_degree: Vec::new(),
+        };
+        // The gauge first, so that it can be cut off; then the rest of the affine map.
+        let affine: [fn(f64, f64) -> Vector2<f64>; 6] = [
+            |_, _| Vector2::new(1.0, 0.0),
+            |_, _| Vector2::new(0.0, 1.0),
+            |x, _| Vector2::new(0.0, x),
+            |x, _| Vector2::new(x, 0.0),
+            |_, y| Vector2::new(y, 0.0),
+            |_, y| Vector2::new(0.0, y),
+        ];
+        for f in affine {
+            builder.add(&lattice.project(f), None);
+        }
+        for k in (1..=3).filter(|k| 2 * k + 1 <= degree) {
+            builder.add(
+                &lattice.project(|x, y| Vector2::new(x, y) * (x * x + y * y).powi(k as i32)),
+                None,
+            );
+        }
+        let decentering: [fn(f64, f64) -> Vector2<f64>; 4] = [
+            |x, y| Vector2::new(3.0 * x * x + y * y, 2.0 * x * y),
+            |x, y| Vector2::new(2.0 * x * y, x * x + 3.0 * y * y),
+            |x, y| Vector2::new(x * x, x * y),
+            |x, y| Vector2::new(x * y, y * y),
+        ];
+        for f in decentering {
+            builder.add(&lattice.project(f), None);
+        }
+        if let Some(profile) = profile {
+            for axis in 0..2 {
+                builder.add(
+                    &lattice.project(|x, y| profile.center_shift(&Vector2::new(x, y), axis)),
+                    None,
+                );
+            }
+        }
+        for total in 2..=degree {
+            for (k, _) in terms
+                .iter()
+                .enumerate()
+                .filter(|(_, (i, j))| i + j == total)
+            {
+                for component in 0..2 {
+                    let mut single = DVector::zeros(2 * terms.len());
+                    single[2 * k + component] = 1.0;
+                    builder.add(&single, Some(total));
+                }
+            }
+        }
+        builder.finish(degree)
+    }
+
+    /// Number of directions.
+    pub fn len(&self) -> usize {
+        self.penalized_degree.len()
+    }
+
+    /// Whether there is no direction at all.
+    pub fn is_empty(&self) -> bool {
+        self.penalized_degree.is_empty()
+    }
+
+    /// Per direction: the degree whose smoothness weight holds it, `None` if it is free.
+    pub fn penalized_degrees(&self) -> &[Option<usize>] {
+        &self.penalized_degree
+    }
+
+    /// Legendre coefficients (`2 k + component`, rows) per direction (columns).
+    pub fn coefficients(&self) -> &DMatrix<f64> {
+        &self.coefficients
+    }
+
+    /// How much of each direction a polynomial holds.
+    pub fn amounts(&self, polynomial: &Polynomial) -> DVector<f64> {
+        let flat = DVector::from_iterator(
+            2 * polynomial.coefficients.len(),
+            polynomial.coefficients.iter().flat_map(|c| [c.x, c.y]),
+        );
+        &self.dual * flat
+    }
+
+    /// Adds the given amount of each direction to a polynomial of the same degree.
+    pub fn add_to(&self, amounts: &DVector<f64>, polynomial: &mut Polynomial) {
+        let change = &self.coefficients * amounts;
+        for (k, c) in polynomial.coefficients.iter_mut().enumerate() {
+            c.x += change[2 * k];
+            c.y += change[2 * k + 1];
+        }
+    }
+}
+
+/// The radial part of a direction field: `F(p) = base(p) + p * sum_k a_k |p|^2k`, k = 1..3, with
+/// `p` the offset from the image center in half widths.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RadialProfile {
+    base: BaseLens,
+    half_width_px: f64,
+    a: [f64; 3],
+}
+
+impl RadialProfile {
+    /// Reads the profile from a field's base lens and polynomial.
+    pub fn of(sensor: SensorSize, base: BaseLens, polynomial: &Polynomial) -> Self {
+        // Least squares of the polynomial's radial part on the three terms plus the linear one.
+        let half_width_px = f64::from(sensor.width) / 2.0;
+        let mut normal = nalgebra::Matrix4::zeros();
+        let mut right = nalgebra::Vector4::zeros();
+        for (pixel, p) in lattice_nodes(sensor) {
+            let r2 = p.norm_squared();
+            let (value, _) = polynomial.evaluate(sensor, pixel);
+            let row = nalgebra::Vector4::new(1.0, r2, r2 * r2, r2 * r2 * r2);
+            normal += row * row.transpose() * r2;
+            right += row * value.dot(&p);
+        }
+        let a = normal
+            .cholesky()
+            .map_or(nalgebra::Vector4::zeros(), |c| c.solve(&right));
+        Self {
+            base,
+            half_width_px,
+            a: [a[1], a[2], a[3]],
+        }
+    }
+
+    /// Derivative of `F` along one axis: what shifting its center does, per half width.
+    fn center_shift(&self, p: &Vector2<f64>, axis: usize) -> Vector2<f64> {
+        let (_, base) = self.base.evaluate(&(p * self.half_width_px));
+        let r2 = p.norm_squared();
+        let [a1, a2, a3] = self.a;
+        let g = r2 * (a1 + r2 * (a2 + r2 * a3));
+        let dg = 2.0 * (a1 + r2 * (2.0 * a2 + r2 * 3.0 * a3));
+        let mut shift = base.column(axis) * self.half_width_px + p * (dg * p[axis]);
+        shift[axis] += g;
+        shift
+    }
+}
+
+/// Nodes of a regular lattice over the sensor: the pixel and its offset from the image center in
+/// half widths.
+fn lattice_nodes(sensor: SensorSize) -> impl Iterator<Item = (PixelPoint, Vector2<f64>)> {
+    let (w, h) = (f64::from(sensor.width), f64::from(sensor.height));
+    let longer = w.max(h);
+    let count = |extent: f64| ((LATTICE as f64 * extent / longer).ceil() as usize).max(12);
+    let (nu, nv) = (count(w), count(h));
+    (0..nv).flat_map(move |j| {
+        (0..nu).map(move |i| {
+            let u = (i as f64 + 0.5) / nu as f64 * w - 0.5;
+            let v = (j as f64 + 0.5) / nv as f64 * h - 0.5;
+            let p = Vector2::new(u - (w / 2.0 - 0.5), v - (h / 2.0 - 0.5)) / (w / 2.0);
+            (PixelPoint::new(u, v), p)
+        })
+    })
+}
+
+/// Inner products over the sensor, in Legendre coefficients.
+struct Lattice {
+    nodes: Vec<Vector2<f64>>,
+    /// Products at the nodes, one row per node.
+    products: DMatrix<f64>,
+    /// Upper Cholesky factor U of the mean Gram matrix: `|U a|` is the RMS of the polynomial.
+    factor: DMatrix<f64>,
+    factor_inverse: DMatrix<f64>,
+}
+
+impl Lattice {
+    fn new(sensor: SensorSize, degree: usize) -> Self {
+        let (pixels, nodes): (Vec<_>, Vec<_>) = lattice_nodes(sensor).unzip();
+        let term_count = polynomial::term_count(degree);
+        let mut products = DMatrix::zeros(pixels.len(), term_count);
+        let mut row = Vec::new();
+        for (n, pixel) in pixels.iter().enumerate() {
+            polynomial::basis(sensor, degree, *pixel, &mut row);
+            for (k, [value, _, _]) in row.iter().enumerate() {
+                products[(n, k)] = *value;
+            }
+        }
+        let gram = products.tr_mul(&products) / pixels.len() as f64;
+        // Legendre products are linearly independent on any lattice denser than their degree.
+        let factor = gram.cholesky().map_or_else(
+            || DMatrix::identity(term_count, term_count),
+            |c| c.l().transpose(),
+        );
+        let factor_inverse = factor
+            .clone()
+            .try_inverse()
+            .unwrap_or_else(|| DMatrix::identity(term_count, term_count));
+        Self {
+            nodes,
+            products,
+            factor,
+            factor_inverse,
+        }
+    }
+
+    /// Legendre coefficients (`2 k + component`) of the best approximation to a function of the
+    /// offset from the image center in half widths.
+    fn project(&self, f: impl Fn(f64, f64) -> Vector2<f64>) -> DVector<f64> {
+        let values: Vec<Vector2<f64>> = self.nodes.iter().map(|p| f(p.x, p.y)).collect();
+        let mut out = DVector::zeros(2 * self.factor.nrows());
+        for component in 0..2 {
+            let sampled =
+                DVector::from_iterator(values.len(), values.iter().map(|value| value[component]));
+            let right = self.products.tr_mul(&sampled) / values.len() as f64;
+            let solved = &self.factor_inverse * (self.factor_inverse.tr_mul(&right));
+            for k in 0..solved.len() {
+                out[2 * k + component] = solved[k];
+            }
+        }
+        out
+    }
+
+    /// Applies a square matrix to each component of interleaved coefficients.
+    fn per_component(matrix: &DMatrix<f64>, interleaved: &DVector<f64>) -> DVector<f64> {
+        let n = matrix.nrows();
+        let split = DMatrix::from_fn(n, 2, |k, c| interleaved[2 * k + c]);
+        let image = matrix * split;
+        DVector::from_fn(2 * n, |i, _| image[(i / 2, i % 2)])
+    }
+}
+
+/// Gram-Schmidt in coordinates where the sensor's inner product is Euclidean.
+struct Builder<'a> {
+    lattice: &'a Lattice,
+    orthonormal: Vec<DVector<f64>>,
+    penalized_degree: Vec<Option<usize>>,
+}
+
+impl Builder<'_> {
+    /// Adds what a direction has beyond those already there, if anything.
+    fn add(&mut self, legendre: &DVector<f64>, penalized_degree: Option<usize>) {
+        let mut rest = Lattice::per_component(&self.lattice.factor, legendre);
+        let original = rest.norm();
+        // Twice is enough for orthogonality to round-off.
+        for _ in 0..2 {
+            for q in &self.orthonormal {
+                let along = q.dot(&rest);
+                rest.axpy(-along, q, 1.0);
+            }
+        }
+        let length = rest.norm();
+        // Below this the direction is already spanned and the rest is round-off.
+        if length > 1e-7 * original {
+            self.orthonormal.push(rest / length);
+            self.penalized_degree.push(penalized_degree);
+        }
+    }
+
+    fn finish(self, degree: usize) -> StructuredBasis {
+        let kept = &self.orthonormal[GAUGE_DIRECTIONS..];
+        let rows = 2 * polynomial::term_count(degree);
+        let mut coefficients = DMatrix::zeros(rows, kept.len());
+        let mut dual = DMatrix::zeros(kept.len(), rows);
+        for (k, q) in kept.iter().enumerate() {
+            let column = Lattice::per_component(&self.lattice.factor_inverse, q);
+            coefficients.set_column(k, &column);
+            let form = Lattice::per_component(&self.lattice.factor.transpose(), q);
+            dual.set_row(k, &form.transpose());
+        }
+        StructuredBasis {
+            degree,
+            coefficients,
+            dual,
+            penalized_degree: self.penalized_degree[GAUGE_DIRECTIONS..].to_vec(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::Projection;
+
+    const SENSOR: SensorSize = SensorSize::new(640, 480);
+
+    #[test]
+    fn directions_span_everything_but_the_gauge() {
+        for degree in [3, 5, 7] {
+            let basis = StructuredBasis::new(SENSOR, degree, None);
+            let wanted = 2 * polynomial::term_count(degree) - GAUGE_DIRECTIONS;
+            assert_eq!(basis.len(), wanted, "degree {degree}");
+            let free = basis
+                .penalized_degrees()
+                .iter()
+                .filter(|d| d.is_none())
+                .count();
+            // Affine 6 - 3, decentering 2, projective 2, and the radial terms that fit.
+            assert_eq!(free, 7 + (degree - 1) / 2, "degree {degree}");
+        }
+    }
+
+    #[test]
+    fn amounts_read_back_what_was_added() {
+        let basis = StructuredBasis::new(SENSOR, 7, None);
+        let amounts = DVector::from_fn(basis.len(), |k, _| (k as f64 * 1.3).sin());
+        let mut polynomial = Polynomial::zero(7);
+        basis.add_to(&amounts, &mut polynomial);
+        assert!((basis.amounts(&polynomial) - amounts).norm() < 1e-11);
+    }
+
+    #[test]
+    fn an_amount_is_the_rms_over_the_sensor() {
+        let basis = StructuredBasis::new(SENSOR, 7, None);
+        let mut amounts = DVector::zeros(basis.len());
+        amounts[17] = 0.25;
+        let mut polynomial = Polynomial::zero(7);
+        basis.add_to(&amounts, &mut polynomial);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (pixel, _) in lattice_nodes(SENSOR) {
+            sum += polynomial.evaluate(SENSOR, pixel).0.norm_squared();
+            count += 1.0;
+        }
+        assert!((f64::sqrt(sum / count) - 0.25).abs() < 1e-10);
+    }
+
+    #[test]
+    fn radial_distortion_costs_no_penalized_direction() {
+        let basis = StructuredBasis::new(SENSOR, 7, None);
+        let lattice = Lattice::new(SENSOR, 7);
+        let radial = lattice.project(|x, y| {
+            let r2 = x * x + y * y;
+            Vector2::new(x, y) * (1.0 - 0.2 * r2 + 0.05 * r2 * r2 - 0.01 * r2 * r2 * r2)
+        });
+        let polynomial = Polynomial {
+            degree: 7,
+            coefficients: (0..36)
+                .map(|k| Vector2::new(radial[2 * k], radial[2 * k + 1]))
+                .collect(),
+        };
+        let amounts = basis.amounts(&polynomial);
+        for (amount, penalized) in amounts.iter().zip(basis.penalized_degrees()) {
+            assert!(penalized.is_none() || amount.abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn shifted_profile_is_free_to_first_order() {
+        let base = BaseLens {
+            projection: Projection::Equidistant,
+            focal_px: 250.0,
+        };
+        let profile = RadialProfile {
+            base,
+            half_width_px: 320.0,
+            a: [0.1, -0.03, 0.01],
+        };
+        let p = Vector2::new(0.6, -0.3);
+        let f = |p: &Vector2<f64>| {
+            let r2 = p.norm_squared();
+            base.evaluate(&(p * 320.0)).0 + p * (0.1 * r2 - 0.03 * r2 * r2 + 0.01 * r2.powi(3))
+        };
+        for axis in 0..2 {
+            let mut step = Vector2::zeros();
+            step[axis] = 1e-5;
+            let difference = (f(&(p + step)) - f(&(p - step))) / 2e-5;
+            assert!((difference - profile.center_shift(&p, axis)).norm() < 1e-9);
+        }
+        assert_eq!(
+            StructuredBasis::new(SENSOR, 7, Some(&profile))
+                .penalized_degrees()
+                .iter()
+                .filter(|d| d.is_none())
+                .count(),
+            12
+        );
+    }
+}
