@@ -5,3 +5,4 @@ pub mod dataset;
 pub mod field;
 pub mod geometry;
 pub mod report;
+pub mod simulate;
