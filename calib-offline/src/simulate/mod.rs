@@ -19,3 +19,6 @@ pub use matches::{MatchSet, TrueMatch};
 pub use optics::CameraOptics;
 pub use preset::OpticsKind;
 pub use scene::{Scene, SceneError, SceneSettings};
+
+#[cfg(test)]
+mod tests;

@@ -86,10 +86,10 @@ struct Layout {
 
 const NARROW: Layout = Layout {
     baseline_mm: 210.0,
-    distance_mm: 330.0,
-    toe_in_mm: 335.0,
+    distance_mm: 350.0,
+    toe_in_mm: 355.0,
     radius_mm: 85.0,
-    spread_shift_mm: [24.0, 30.0],
+    spread_shift_mm: [36.0, 40.0],
     spread_look_deg: [0.0, 0.0],
 };
 
@@ -150,20 +150,20 @@ pub(super) fn rig(kind: OpticsKind, sensor: SensorSize) -> RigPreset {
 fn layout(kind: OpticsKind) -> Layout {
     match kind {
         OpticsKind::Fisheye => Layout {
-            baseline_mm: 210.0,
-            distance_mm: 330.0,
+            baseline_mm: 140.0,
+            distance_mm: 230.0,
             toe_in_mm: f64::INFINITY,
-            radius_mm: 150.0,
+            radius_mm: 190.0,
             spread_shift_mm: [0.0, 0.0],
-            spread_look_deg: [48.0, 40.0],
+            spread_look_deg: [46.0, 38.0],
         },
         OpticsKind::Wide => Layout {
-            baseline_mm: 110.0,
-            distance_mm: 190.0,
-            toe_in_mm: 500.0,
-            radius_mm: 100.0,
+            baseline_mm: 90.0,
+            distance_mm: 140.0,
+            toe_in_mm: 400.0,
+            radius_mm: 110.0,
             spread_shift_mm: [0.0, 0.0],
-            spread_look_deg: [22.0, 18.0],
+            spread_look_deg: [18.0, 18.0],
         },
         OpticsKind::Telephoto => Layout {
             baseline_mm: 420.0,
@@ -200,17 +200,17 @@ fn camera(kind: OpticsKind, idx: usize, sensor: SensorSize) -> (Lens, Media) {
     let brown = Distortion::Brown { k1, k2, k3, p1, p2 };
     // Into water the same lens sees a narrower field; the shorter one keeps the scene.
     match kind {
-        OpticsKind::Brown => (perspective(1800.0, brown, Vec::new()), Media::Air),
+        OpticsKind::Brown => (perspective(2050.0, brown, Vec::new()), Media::Air),
         OpticsKind::Paper => (
-            perspective(1800.0, brown, paper_bumps(idx, sensor)),
+            perspective(2050.0, brown, paper_bumps(idx, sensor)),
             Media::Air,
         ),
         OpticsKind::Bumps => (
-            perspective(1800.0, brown, strong_bumps(idx, sensor)),
+            perspective(2050.0, brown, strong_bumps(idx, sensor)),
             Media::Air,
         ),
         OpticsKind::Window => (
-            perspective(1800.0, brown, Vec::new()),
+            perspective(2050.0, brown, Vec::new()),
             Media::Flat(FlatWindow {
                 normal: tilted_normal(8.0, 24.0 * side),
                 distance_mm: 40.0,
@@ -220,7 +220,7 @@ fn camera(kind: OpticsKind, idx: usize, sensor: SensorSize) -> (Lens, Media) {
             }),
         ),
         OpticsKind::Port => (
-            perspective(1350.0, brown, Vec::new()),
+            perspective(1540.0, brown, Vec::new()),
             Media::Flat(FlatWindow {
                 normal: tilted_normal(1.5, 2.0 * side),
                 distance_mm: 30.0,
@@ -230,7 +230,7 @@ fn camera(kind: OpticsKind, idx: usize, sensor: SensorSize) -> (Lens, Media) {
             }),
         ),
         OpticsKind::Dome => (
-            perspective(1700.0, brown, Vec::new()),
+            perspective(2330.0, brown, Vec::new()),
             Media::Dome(Dome {
                 center_mm: Vector3::new(4.0 * side, -6.0, 12.0),
                 inner_radius_mm: 50.0,
@@ -278,7 +278,7 @@ fn camera(kind: OpticsKind, idx: usize, sensor: SensorSize) -> (Lens, Media) {
             Media::Air,
         ),
         OpticsKind::Unequal => {
-            let focal_px = if idx == 0 { 2100.0 } else { 1250.0 };
+            let focal_px = if idx == 0 { 2280.0 } else { 1680.0 };
             (perspective(focal_px, brown, Vec::new()), Media::Air)
         }
     }
