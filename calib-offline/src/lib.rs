@@ -7,3 +7,4 @@ pub mod field;
 pub mod geometry;
 pub mod init;
 pub mod report;
+pub mod simulate;
