@@ -6,5 +6,6 @@ pub mod dataset;
 pub mod field;
 pub mod geometry;
 pub mod init;
+pub mod joint;
 pub mod report;
 pub mod simulate;

@@ -1,0 +1,65 @@
+//! An estimate in the frame that users get: the board at the datum pose.
+
+use super::Estimate;
+use crate::field::{CalibratedCamera, CoverageMask, Rig};
+use crate::geometry::RigidTransform;
+
+impl Estimate {
+    /// The calibrated rig. The datum is the first pose used; the calibrated area of a camera is
+    /// that of the corners that count.
+    ///
+    /// `names` are those of the cameras, in order.
+    pub fn rig(&self, names: &[String]) -> Rig {
+        let cameras = self
+            .model
+            .cameras
+            .iter()
+            .zip(names)
+            .enumerate()
+            .map(|(camera_idx, (camera, name))| CalibratedCamera {
+                name: name.clone(),
+                coverage: self.coverage(camera_idx),
+                field: camera.field.clone(),
+                rig_from_camera: self.datum_from_first_camera() * camera.camera_from_rig.inverse(),
+            })
+            .collect();
+        Rig {
+            cameras,
+            datum_pose: self.observations.poses.first().copied().unwrap_or(0),
+        }
+    }
+
+    /// Per pose of the observations, in the rig's frame.
+    pub fn rig_from_board(&self) -> Vec<RigidTransform> {
+        let datum = self.datum_from_first_camera();
+        self.model
+            .rig_from_board
+            .iter()
+            .map(|pose| datum * *pose)
+            .collect()
+    }
+
+    fn datum_from_first_camera(&self) -> RigidTransform {
+        self.model
+            .rig_from_board
+            .first()
+            .map_or_else(RigidTransform::identity, RigidTransform::inverse)
+    }
+
+    fn coverage(&self, camera_idx: usize) -> CoverageMask {
+        let corners = self
+            .observations
+            .views
+            .iter()
+            .zip(&self.robust_weights)
+            .filter(|(view, _)| view.camera_idx == camera_idx)
+            .flat_map(|(view, weights)| {
+                view.corners
+                    .iter()
+                    .zip(weights)
+                    .filter(|(_, weight)| **weight > 0.0)
+                    .map(|(corner, _)| corner.pixel)
+            });
+        CoverageMask::from_corners(self.model.cameras[camera_idx].field.sensor, corners)
+    }
+}

@@ -1,0 +1,8 @@
+//! The default estimate: ray fields of all cameras, poses, extrinsics and board shape in one
+//! adjustment, with smoothness weights and noise found from the data. METHOD sections 2 and 9A.
+
+pub mod calibrated;
+pub mod estimate;
+pub mod evidence;
+
+pub use estimate::{Estimate, EstimateError, estimate};
