@@ -3,6 +3,7 @@
 pub mod adjust;
 pub mod board;
 pub mod dataset;
+pub mod evaluate;
 pub mod field;
 pub mod geometry;
 pub mod init;

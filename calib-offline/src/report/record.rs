@@ -1,6 +1,7 @@
 //! `calibration.json`: everything a calibration found, versioned, enough to draw every figure again.
 
 pub use crate::board::BoardShape;
+pub use crate::evaluate::verdict::{Grade, Verdict};
 use crate::board::BoardSpec;
 use crate::field::Rig;
 use crate::geometry::{PixelPoint, RigidTransform};
@@ -125,25 +126,4 @@ pub struct HeldOutRecord {
     pub point_count: usize,
     /// Held-out corners outside the calibrated area of their fold, for which nothing was measured.
     pub outside_count: usize,
-}
-
-/// The judgement with its reasons.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Verdict {
-    /// The grade.
-    pub grade: Grade,
-    /// Each with its figure and threshold.
-    pub reasons: Vec<String>,
-}
-
-/// Pass, doubtful or fail.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Grade {
-    /// Nothing speaks against it.
-    Pass,
-    /// Usable with care: see the reasons.
-    Doubtful,
-    /// Not usable: see the reasons.
-    Fail,
 }
