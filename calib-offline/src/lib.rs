@@ -1,7 +1,9 @@
 //! Camera calibration with one ray per pixel, from a chessboard on a rotation stage.
 
+pub mod atomic_file;
 pub mod board;
 pub mod dataset;
 pub mod field;
 pub mod geometry;
+pub mod progress;
 pub mod report;
