@@ -1,16 +1,16 @@
-//! How long steps tell their caller where they are. Libraries never print.
+//! Progress of long work, told to whoever wants to show it. Libraries never print.
 
-/// Told about the start, the steps and the end of each stage; may be called from several threads.
+/// Told how far a stage of the work is. Called from several threads at once.
 pub trait Progress: Sync {
-    /// A stage begins. `total` is the number of steps; 0 if it is not known.
+    /// A stage of `total` steps begins.
     fn begin(&self, stage: &str, total: usize);
-    /// One step is done.
+    /// One more step of the stage is done.
     fn advance(&self);
-    /// The stage is done.
+    /// The stage is over, whether or not every step was made.
     fn end(&self);
 }
 
-/// Tells nobody.
+/// Shows nothing.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Silent;
 
