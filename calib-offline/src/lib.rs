@@ -1,6 +1,7 @@
 //! Camera calibration with one ray per pixel, from a chessboard on a rotation stage.
 
 pub mod adjust;
+pub mod atomic_file;
 pub mod board;
 pub mod dataset;
 pub mod evaluate;
@@ -8,5 +9,6 @@ pub mod field;
 pub mod geometry;
 pub mod init;
 pub mod joint;
+pub mod progress;
 pub mod report;
 pub mod simulate;

@@ -1,5 +1,18 @@
 //! What a user records: a folder with `dataset.toml` and images or corners, or both.
 
+pub mod corners;
+pub mod identity;
+pub mod images;
+pub mod manifest;
+pub mod split;
+pub mod stage;
+pub mod sufficiency;
+
+pub use corners::{CornersError, load_corners, write_corners};
+pub use identity::input_sha256;
+pub use manifest::ManifestError;
+pub use sufficiency::{SufficiencyError, check_sufficiency};
+
 use crate::board::BoardSpec;
 use crate::geometry::{PixelPoint, SensorSize};
 use std::collections::BTreeSet;
@@ -18,6 +31,39 @@ pub struct Dataset {
     pub stage: Option<StageSpec>,
     /// Poses that the user leaves out.
     pub excluded_poses: BTreeSet<usize>,
+}
+
+impl Dataset {
+    /// The manifest's file name.
+    pub const MANIFEST: &str = "dataset.toml";
+    /// The corners' file name.
+    pub const CORNERS: &str = "corners.csv";
+
+    /// Where the corners are, or would be written.
+    pub fn corners_path(&self) -> PathBuf {
+        self.folder.join(Self::CORNERS)
+    }
+
+    /// The index of the camera with this name.
+    pub fn camera_idx(&self, name: &str) -> Option<usize> {
+        self.cameras.iter().position(|camera| camera.name == name)
+    }
+
+    /// Whether any camera has an image.
+    pub fn has_images(&self) -> bool {
+        self.cameras
+            .iter()
+            .any(|camera| camera.images.iter().any(Option::is_some))
+    }
+
+    /// Poses that have an entry in the cameras' lists of images; 0 if there are none.
+    pub fn image_pose_count(&self) -> usize {
+        self.cameras
+            .iter()
+            .map(|camera| camera.images.len())
+            .max()
+            .unwrap_or(0)
+    }
 }
 
 /// One camera of a dataset.
