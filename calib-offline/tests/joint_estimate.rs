@@ -95,3 +95,28 @@ fn explore() {
         }
     }
 }
+
+#[test]
+fn noise_free() {
+    for optics in [OpticsKind::Brown, OpticsKind::Port] {
+        let scene = Scene::new(SceneSettings::standard(optics, 1)).unwrap();
+        let e = run(&scene);
+        println!(
+            "{optics:?}: sigma {:.3e} nu {} rho {:.3} costs {:?} stop {}",
+            e.noise.variance_px2.sqrt(),
+            e.noise.freedom,
+            e.neighbor_correlation,
+            e.costs,
+            e.stop
+        );
+        for f in &e.smoothness {
+            println!("{f:?}");
+        }
+        for set in [MatchSet::Points, MatchSet::Holdout] {
+            let (error, direct, limit, outside) = ratio(&scene, &e, set, false);
+            println!(
+                "   error {error:.3e} direct {direct:.3e} oracle {limit:.5} outside {outside}"
+            );
+        }
+    }
+}

@@ -94,7 +94,7 @@ pub fn minimize(
                 continue;
             };
             let step = equations.step(&reduced);
-            let promised = equations.predicted_decrease(&step);
+            let promised = equations.predicted_decrease(&step, damping);
             let stepped = model.stepped(&layout, &step);
             let reached = cost(&stepped, observations, bases, weights, priors);
             let settled = promised <= settings.relative_decrease * current;

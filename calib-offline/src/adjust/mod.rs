@@ -2,6 +2,9 @@
 //! are smallest. Initialization uses it on a few boards of one camera, the joint estimate on
 //! everything.
 
+mod assembly;
+pub mod banded;
+pub mod knots;
 pub mod levenberg;
 pub mod model;
 pub mod normal_equations;

@@ -1,11 +1,13 @@
 //! Everything that an adjustment moves, and how a step moves it.
 
+use super::knots::KnotOrder;
 use super::observations::{Observations, ViewBasis};
 use crate::board::BoardShape;
-use crate::field::RayField;
+use crate::field::polynomial::{Polynomial, legendre_norms};
 use crate::field::structured::StructuredBasis;
+use crate::field::{RayField, SmoothMap};
 use crate::geometry::RigidTransform;
-use nalgebra::{DVector, Vector3};
+use nalgebra::{DVector, Vector2, Vector3};
 use std::ops::Range;
 
 /// Cameras, poses and board shape.
@@ -25,7 +27,8 @@ pub struct Model {
 /// One camera of a [`Model`].
 #[derive(Debug, Clone)]
 pub struct CameraModel {
-    /// What each pixel sees, camera frame.
+    /// What each pixel sees, camera frame. What of it exists is what moves: the direction's
+    /// polynomial always, its spline and the offset if they are there.
     pub field: RayField,
     /// Directions in which the field's polynomial may move.
     pub basis: StructuredBasis,
@@ -33,17 +36,68 @@ pub struct CameraModel {
     pub camera_from_rig: RigidTransform,
 }
 
-/// Where each global parameter stands in a step vector. Poses follow behind, 6 each.
+impl CameraModel {
+    /// Order of the spline's knots, if the direction has a spline.
+    pub fn knot_order(&self) -> Option<KnotOrder> {
+        self.field
+            .direction
+            .spline
+            .as_ref()
+            .map(|spline| KnotOrder::new(spline.grid))
+    }
+
+    /// Amounts of the offset's normalized Legendre products, mm RMS over the sensor: x of all
+    /// terms, then y of all terms; empty for a central camera.
+    pub fn offset_amounts(&self) -> DVector<f64> {
+        let Some(offset) = &self.field.offset else {
+            return DVector::zeros(0);
+        };
+        let polynomial = &offset.polynomial;
+        let norms = legendre_norms(polynomial.degree);
+        let terms = polynomial.coefficients.len();
+        DVector::from_fn(2 * terms, |k, _| {
+            polynomial.coefficients[k % terms][k / terms] * norms[k % terms]
+        })
+    }
+
+    /// The spline's coefficients in knot order, two components interleaved.
+    pub fn spline_amounts(&self) -> DVector<f64> {
+        match (&self.field.direction.spline, self.knot_order()) {
+            (Some(spline), Some(order)) => {
+                let mut amounts = DVector::zeros(2 * order.knot_count());
+                for (row_major, c) in spline.coefficients.iter().enumerate() {
+                    let at = 2 * order.from_row_major(row_major);
+                    amounts[at] = c.x;
+                    amounts[at + 1] = c.y;
+                }
+                amounts
+            }
+            _ => DVector::zeros(0),
+        }
+    }
+}
+
+/// Where each global parameter stands in a step vector. Poses follow behind, 6 each; each
+/// camera's spline has a vector of its own.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Layout {
-    /// Amounts of the field's polynomial directions, per camera.
-    pub direction: Vec<Range<usize>>,
-    /// Rotation (rad) and translation (mm) of `camera_from_rig`; `None` for camera 0.
-    pub extrinsics: Vec<Option<Range<usize>>>,
+    /// Per camera.
+    pub cameras: Vec<CameraLayout>,
     /// Coefficients of the board's shape, mm.
     pub board: Range<usize>,
     /// Number of global parameters.
     pub global_len: usize,
+}
+
+/// Where the global parameters of one camera stand.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CameraLayout {
+    /// Amounts of the direction's polynomial.
+    pub direction: Range<usize>,
+    /// Amounts of the offset's polynomial, mm; empty for a central camera.
+    pub offset: Range<usize>,
+    /// Rotation (rad) and translation (mm) of `camera_from_rig`; `None` for camera 0.
+    pub extrinsics: Option<Range<usize>>,
 }
 
 /// A change of every parameter.
@@ -53,6 +107,8 @@ pub struct Step {
     pub global: DVector<f64>,
     /// Per pose: rotation vector (rad), translation (mm).
     pub poses: Vec<nalgebra::Vector6<f64>>,
+    /// Per camera: the spline's coefficients in knot order; empty without a spline.
+    pub splines: Vec<DVector<f64>>,
 }
 
 impl Model {
@@ -63,14 +119,19 @@ impl Model {
             next += len;
             next - len..next
         };
-        let direction = self.cameras.iter().map(|c| take(c.basis.len())).collect();
-        let extrinsics = (0..self.cameras.len())
-            .map(|idx| (idx > 0).then(|| take(6)))
+        let cameras = self
+            .cameras
+            .iter()
+            .enumerate()
+            .map(|(idx, camera)| CameraLayout {
+                direction: take(camera.basis.len()),
+                offset: take(camera.offset_amounts().len()),
+                extrinsics: (idx > 0).then(|| take(6)),
+            })
             .collect();
         let board = take(self.board_shape.terms.len());
         Layout {
-            direction,
-            extrinsics,
+            cameras,
             board,
             global_len: next,
         }
@@ -80,14 +141,19 @@ impl Model {
     pub fn stepped(&self, layout: &Layout, step: &Step) -> Self {
         let mut next = self.clone();
         for (idx, camera) in next.cameras.iter_mut().enumerate() {
-            let amounts = step
-                .global
-                .rows_range(layout.direction[idx].clone())
-                .into_owned();
+            let ranges = &layout.cameras[idx];
+            let amounts = step.global.rows_range(ranges.direction.clone()).into_owned();
             camera
                 .basis
                 .add_to(&amounts, &mut camera.field.direction.polynomial);
-            if let Some(range) = &layout.extrinsics[idx] {
+            if let Some(offset) = &mut camera.field.offset {
+                let change = step.global.rows_range(ranges.offset.clone());
+                add_offset(change.as_slice(), &mut offset.polynomial);
+            }
+            if let Some(order) = camera.knot_order() {
+                add_spline(&order, &step.splines[idx], &mut camera.field.direction);
+            }
+            if let Some(range) = &ranges.extrinsics {
                 let change = step.global.rows_range(range.clone());
                 camera.camera_from_rig = camera.camera_from_rig.perturbed(
                     &Vector3::new(change[0], change[1], change[2]),
@@ -113,15 +179,26 @@ impl Model {
         observations
             .views
             .iter()
-            .map(|view| {
-                let field = &self.cameras[view.camera_idx].field;
-                ViewBasis::new(
-                    view,
-                    field.sensor,
-                    field.base,
-                    field.direction.polynomial.degree,
-                )
-            })
+            .map(|view| ViewBasis::new(view, &self.cameras[view.camera_idx].field))
             .collect()
+    }
+}
+
+/// Adds a change of [`CameraModel::offset_amounts`].
+fn add_offset(change: &[f64], polynomial: &mut Polynomial) {
+    let norms = legendre_norms(polynomial.degree);
+    let terms = polynomial.coefficients.len();
+    for (k, c) in polynomial.coefficients.iter_mut().enumerate() {
+        *c += Vector2::new(change[k], change[terms + k]) / norms[k];
+    }
+}
+
+/// Adds a change of [`CameraModel::spline_amounts`].
+fn add_spline(order: &KnotOrder, change: &DVector<f64>, direction: &mut SmoothMap) {
+    if let Some(spline) = &mut direction.spline {
+        for (row_major, c) in spline.coefficients.iter_mut().enumerate() {
+            let at = 2 * order.from_row_major(row_major);
+            *c += Vector2::new(change[at], change[at + 1]);
+        }
     }
 }

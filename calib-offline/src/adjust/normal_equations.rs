@@ -1,73 +1,88 @@
-//! The normal equations in blocks: global parameters, poses, and their coupling.
+//! The normal equations in blocks, and their solution.
 //!
-//! The objective is `sum w |r|^2 + sum prior a^2` (residuals in px, `w` in 1/px^2). A pose is
-//! coupled to the global parameters only, never to another pose, so poses are eliminated first:
-//! the work is linear in their number and nothing larger than the global block is factorised
-//! (METHOD 2.5, 2.6).
-//!
-//! A field's direction enters a residual through `M ds`, `ds = sum_k L_k(x) da_k`, so its block is
-//! `sum w (M^T M) (x) (L L^T)`: three symmetric products per view, formed in Legendre coefficients
-//! and carried over to the structured directions once per camera.
+//! The objective is `sum w |r|^2 + sum prior a^2` (residuals in px, `w` in 1/px^2). Unknowns fall
+//! into three kinds: global ones (the fields' polynomials, extrinsics, board shape), poses, and
+//! the knots of each camera's spline. A pose is coupled to another pose only through the other
+//! kinds, so without splines poses are eliminated first and the work is linear in their number.
+//! With splines these are eliminated first: each is banded and coupled to everything else (the
+//! border), METHOD 2.5. Nothing is ever formed that couples knots densely.
 
-use super::model::{Layout, Model, Step};
-use super::observations::{Observations, ViewBasis, ViewBlock};
-use super::residual::{Linearization, linearize};
-use crate::field::FieldSample;
-use crate::geometry::so3::skew;
-use nalgebra::{Cholesky, DMatrix, DVector, Matrix2, Matrix6, Vector2, Vector6};
+use super::assembly::{self, Components, EXTRINSICS, SplineSums, ViewSums, predict};
+use super::banded::{BandedCholesky, BandedMatrix};
+use super::model::{CameraModel, Layout, Model, Step};
+use super::observations::{Observations, ViewBasis};
+use crate::field::polynomial::legendre_norms;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix6, Vector2, Vector6};
 use rayon::prelude::*;
 
 /// Inverse variances of the parameters that smoothness or plausibility holds back.
 #[derive(Debug, Clone)]
 pub struct Priors {
-    /// Per camera and direction, 1/rad^2; 0 for a free direction.
-    pub direction: Vec<DVector<f64>>,
+    /// Per camera.
+    pub cameras: Vec<CameraPriors>,
     /// Of each coefficient of the board's shape, 1/mm^2.
     pub board: f64,
+}
+
+/// Priors of one camera.
+#[derive(Debug, Clone)]
+pub struct CameraPriors {
+    /// Per amount of the direction's polynomial, 1/rad^2; 0 for a free direction.
+    pub direction: DVector<f64>,
+    /// Per amount of the offset's polynomial, 1/mm^2; empty for a central camera.
+    pub offset: DVector<f64>,
+    /// Weight of the spline's thin-plate energy, 1/rad^2.
+    pub spline: f64,
+    /// That energy; `None` without a spline.
+    pub thin_plate: Option<BandedMatrix>,
+}
+
+impl CameraPriors {
+    /// No prior on the polynomials, nothing for the spline yet.
+    pub fn free(camera: &CameraModel) -> Self {
+        Self {
+            direction: DVector::zeros(camera.basis.len()),
+            offset: DVector::zeros(camera.offset_amounts().len()),
+            spline: 0.0,
+            thin_plate: camera.knot_order().map(|order| order.thin_plate()),
+        }
+    }
+
+    fn cost(&self, camera: &CameraModel) -> f64 {
+        let weighted = |amounts: &DVector<f64>, weights: &DVector<f64>| -> f64 {
+            amounts
+                .iter()
+                .zip(weights.iter())
+                .map(|(a, w)| w * a * a)
+                .sum()
+        };
+        let amounts = camera.basis.amounts(&camera.field.direction.polynomial);
+        let spline = self.thin_plate.as_ref().map_or(0.0, |energy| {
+            let amounts = camera.spline_amounts();
+            self.spline * energy.times(&amounts).dot(&amounts)
+        });
+        weighted(&amounts, &self.direction)
+            + weighted(&camera.offset_amounts(), &self.offset)
+            + spline
+    }
 }
 
 impl Priors {
     /// What the priors add to the objective.
     pub fn cost(&self, model: &Model) -> f64 {
-        let directions: f64 = model
+        let cameras: f64 = model
             .cameras
             .iter()
-            .zip(&self.direction)
-            .map(|(camera, weight)| {
-                let amounts = camera.basis.amounts(&camera.field.direction.polynomial);
-                amounts
-                    .iter()
-                    .zip(weight.iter())
-                    .map(|(a, w)| w * a * a)
-                    .sum::<f64>()
-            })
+            .zip(&self.cameras)
+            .map(|(camera, priors)| priors.cost(camera))
             .sum();
         let board: f64 = model.board_shape.terms.iter().map(|t| t.2 * t.2).sum();
-        directions + self.board * board
+        cameras + self.board * board
     }
 }
 
 /// Weight per corner, in the order of the views and their corners.
 pub type Weights = Vec<Vec<f64>>;
-
-/// The equations `H step = -gradient` of one linearization, priors included.
-#[derive(Debug, Clone)]
-pub struct NormalEquations {
-    global: DMatrix<f64>,
-    global_gradient: DVector<f64>,
-    poses: Vec<Matrix6<f64>>,
-    pose_gradients: Vec<Vector6<f64>>,
-    /// Global x 6 per pose.
-    coupling: Vec<DMatrix<f64>>,
-}
-
-/// The normal equations after the poses are eliminated.
-#[derive(Debug, Clone)]
-pub struct Reduced {
-    factor: Cholesky<f64, nalgebra::Dyn>,
-    right: DVector<f64>,
-    pose_factors: Vec<Cholesky<f64, nalgebra::Const<6>>>,
-}
 
 /// Residual vectors of every corner (observed minus predicted, px), in the order of the views;
 /// `None` behind the camera.
@@ -81,90 +96,11 @@ pub fn residuals(
         .par_iter()
         .zip(bases)
         .map(|(view, basis)| {
-            Predictor::new(model, observations, view, basis)
+            predict(model, observations, view, basis)
                 .map(|seen| seen.linearization.map(|l| l.residual_px))
                 .collect()
         })
         .collect()
-}
-
-/// Walks the corners of a view with their linearizations.
-struct Predictor<'a> {
-    model: &'a Model,
-    observations: &'a Observations,
-    view: &'a ViewBlock,
-    basis: &'a ViewBasis,
-    next: usize,
-}
-
-/// A corner as the model sees it.
-struct Seen {
-    linearization: Option<Linearization>,
-    /// The corner turned into the rig's axes about the board's origin, mm.
-    turned_in_board: nalgebra::Vector3<f64>,
-    /// The corner turned into the camera's axes about the rig's origin, mm.
-    turned_in_rig: nalgebra::Vector3<f64>,
-}
-
-impl<'a> Predictor<'a> {
-    fn new(
-        model: &'a Model,
-        observations: &'a Observations,
-        view: &'a ViewBlock,
-        basis: &'a ViewBasis,
-    ) -> Self {
-        Self {
-            model,
-            observations,
-            view,
-            basis,
-            next: 0,
-        }
-    }
-
-    fn sample(&self, idx: usize) -> FieldSample {
-        let field = &self.model.cameras[self.view.camera_idx].field;
-        let (mut s, mut ds) = self.basis.base[idx];
-        for (k, c) in field.direction.polynomial.coefficients.iter().enumerate() {
-            s += c * self.basis.products[(idx, k)];
-            ds += c * nalgebra::RowVector2::new(
-                self.basis.products_du[(idx, k)],
-                self.basis.products_dv[(idx, k)],
-            );
-        }
-        FieldSample {
-            s,
-            ds,
-            m_mm: Vector2::zeros(),
-            dm: Matrix2::zeros(),
-        }
-    }
-}
-
-impl Iterator for Predictor<'_> {
-    type Item = Seen;
-
-    fn next(&mut self) -> Option<Seen> {
-        let idx = self.next;
-        let corner = self.view.corners.get(idx)?;
-        self.next += 1;
-        let camera = &self.model.cameras[self.view.camera_idx];
-        let pose = &self.model.rig_from_board[self.view.pose_idx];
-        let mut point = corner.point_in_board;
-        point.z += self
-            .model
-            .board_shape
-            .height_mm(&self.observations.board, &point);
-        let turned_in_board = pose.rotation * point;
-        let turned_in_rig =
-            camera.camera_from_rig.rotation * (turned_in_board + pose.translation_mm);
-        let point_in_camera = turned_in_rig + camera.camera_from_rig.translation_mm;
-        Some(Seen {
-            linearization: linearize(&self.sample(idx), &point_in_camera),
-            turned_in_board,
-            turned_in_rig,
-        })
-    }
 }
 
 /// Sum of `w |r|^2` and of the priors. A corner behind its camera counts as one a sensor's width
@@ -183,17 +119,14 @@ pub fn cost(
         .zip(weights)
         .map(|((view, basis), weights)| {
             let lost_px = f64::from(observations.sensors[view.camera_idx].width);
-            Predictor::new(model, observations, view, basis)
+            predict(model, observations, view, basis)
                 .zip(weights)
                 .map(|(seen, w)| {
-                    w * seen.linearization.map_or(lost_px * lost_px, |l| {
-                        let squared = l.residual_px.norm_squared();
-                        if squared.is_finite() {
-                            squared
-                        } else {
-                            lost_px * lost_px
-                        }
-                    })
+                    let squared = seen
+                        .linearization
+                        .map(|l| l.residual_px.norm_squared())
+                        .filter(|squared| squared.is_finite());
+                    w * squared.unwrap_or(lost_px * lost_px)
                 })
                 .sum()
         })
@@ -201,95 +134,27 @@ pub fn cost(
     per_view.iter().sum::<f64>() + priors.cost(model)
 }
 
-/// What one view contributes, in Legendre coefficients.
-struct ViewSums {
-    /// `sum w (M^T M)_ab L L^T` for (a, b) = (0, 0), (0, 1), (1, 1).
-    direction: [DMatrix<f64>; 3],
-    /// Direction (`2 k + component`) by pose 6, extrinsics 6, board, gradient.
-    direction_small: DMatrix<f64>,
-    /// The same columns by themselves.
-    small: DMatrix<f64>,
+/// The equations `H step = -gradient` of one linearization, priors included.
+#[derive(Debug, Clone)]
+pub struct NormalEquations {
+    global: DMatrix<f64>,
+    global_gradient: DVector<f64>,
+    poses: Vec<Matrix6<f64>>,
+    pose_gradients: Vec<Vector6<f64>>,
+    /// Global x 6 per pose.
+    coupling: Vec<DMatrix<f64>>,
+    splines: Vec<Option<SplineBlock>>,
 }
 
-fn view_sums(
-    model: &Model,
-    observations: &Observations,
-    view: &ViewBlock,
-    basis: &ViewBasis,
-    weights: &[f64],
-) -> ViewSums {
-    let camera = &model.cameras[view.camera_idx];
-    let pose = &model.rig_from_board[view.pose_idx];
-    let board_terms = model.board_shape.terms.len();
-    let small_len = 12 + board_terms + 1;
-    let n = view.corners.len();
-    let mut q = DMatrix::zeros(n, 3);
-    let mut x = [DMatrix::zeros(n, small_len), DMatrix::zeros(n, small_len)];
-    let mut small = DMatrix::zeros(small_len, small_len);
-    let mut row = DMatrix::zeros(2, small_len);
-    let normal_in_camera = camera.camera_from_rig.rotation * pose.rotation.column(2);
-    for (idx, (seen, weight)) in Predictor::new(model, observations, view, basis)
-        .zip(weights)
-        .enumerate()
-    {
-        let Some(l) = seen.linearization.filter(|_| *weight > 0.0) else {
-            continue;
-        };
-        let by_rig = l.by_point * camera.camera_from_rig.rotation;
-        row.view_mut((0, 0), (2, 3))
-            .copy_from(&(-by_rig * skew(&seen.turned_in_board)));
-        row.view_mut((0, 3), (2, 3)).copy_from(&by_rig);
-        row.view_mut((0, 6), (2, 3))
-            .copy_from(&(-l.by_point * skew(&seen.turned_in_rig)));
-        row.view_mut((0, 9), (2, 3)).copy_from(&l.by_point);
-        let by_height = l.by_point * normal_in_camera;
-        let products = model
-            .board_shape
-            .products(&observations.board, &view.corners[idx].point_in_board);
-        for (k, product) in products.enumerate() {
-            row.view_mut((0, 12 + k), (2, 1))
-                .copy_from(&(by_height * product));
-        }
-        row.view_mut((0, small_len - 1), (2, 1))
-            .copy_from(&l.residual_px);
-        let mtm = l.by_s.tr_mul(&l.by_s) * *weight;
-        q[(idx, 0)] = mtm[(0, 0)];
-        q[(idx, 1)] = mtm[(0, 1)];
-        q[(idx, 2)] = mtm[(1, 1)];
-        for column in 0..small_len {
-            let (r0, r1) = (row[(0, column)] * weight, row[(1, column)] * weight);
-            for (component, x) in x.iter_mut().enumerate() {
-                x[(idx, column)] = l.by_s[(0, component)] * r0 + l.by_s[(1, component)] * r1;
-            }
-            for other in 0..=column {
-                small[(other, column)] += row[(0, other)] * r0 + row[(1, other)] * r1;
-            }
-        }
-    }
-    small.fill_lower_triangle_with_upper_triangle();
-    let products = &basis.products;
-    let direction = [0, 1, 2].map(|pair| {
-        let mut scaled = products.clone();
-        for mut column in scaled.column_iter_mut() {
-            column.component_mul_assign(&q.column(pair));
-        }
-        products.tr_mul(&scaled)
-    });
-    let terms = products.ncols();
-    let mut direction_small = DMatrix::zeros(2 * terms, small_len);
-    for (component, x) in x.iter().enumerate() {
-        let block = products.tr_mul(x);
-        for k in 0..terms {
-            direction_small
-                .row_mut(2 * k + component)
-                .copy_from(&block.row(k));
-        }
-    }
-    ViewSums {
-        direction,
-        direction_small,
-        small,
-    }
+/// The equations of one camera's spline.
+#[derive(Debug, Clone)]
+struct SplineBlock {
+    band: BandedMatrix,
+    gradient: DVector<f64>,
+    /// Knots (rows, row-major) by border columns.
+    border: Vec<f64>,
+    /// Where each border column stands among global parameters and poses.
+    columns: Vec<usize>,
 }
 
 impl NormalEquations {
@@ -309,86 +174,93 @@ impl NormalEquations {
             poses: vec![Matrix6::zeros(); pose_count],
             pose_gradients: vec![Vector6::zeros(); pose_count],
             coupling: vec![DMatrix::zeros(layout.global_len, 6); pose_count],
+            splines: Vec::new(),
         };
         let sums: Vec<ViewSums> = observations
             .views
             .par_iter()
             .zip(bases)
             .zip(weights)
-            .map(|((view, basis), weights)| view_sums(model, observations, view, basis, weights))
+            .map(|((view, basis), weights)| {
+                assembly::view_sums(model, observations, view, basis, weights)
+            })
             .collect();
+        let to_columns: Vec<DMatrix<f64>> = model.cameras.iter().map(parameters_to_columns).collect();
         for camera_idx in 0..model.cameras.len() {
-            equations.add_direction_block(model, layout, observations, &sums, camera_idx);
+            equations.add_field_block(layout, observations, &sums, &to_columns, camera_idx);
         }
         for (view, sums) in observations.views.iter().zip(&sums) {
-            equations.add_view(model, layout, view, sums);
+            equations.add_view(layout, view, sums, &to_columns[view.camera_idx]);
         }
+        equations.splines = model
+            .cameras
+            .par_iter()
+            .enumerate()
+            .map(|(camera_idx, camera)| {
+                let order = camera.knot_order()?;
+                let own: Vec<usize> = (0..observations.views.len())
+                    .filter(|k| observations.views[*k].camera_idx == camera_idx)
+                    .collect();
+                let views: Vec<_> = own.iter().map(|k| (&bases[*k], &sums[*k])).collect();
+                let poses: Vec<usize> =
+                    own.iter().map(|k| observations.views[*k].pose_idx).collect();
+                let sums = assembly::spline_sums(camera, &order, &views);
+                Some(SplineBlock::new(&sums, layout, camera_idx, &poses, &to_columns[camera_idx]))
+            })
+            .collect();
         equations.add_priors(model, layout, priors);
         equations
     }
 
-    /// The field-by-field block of a camera, carried over to its structured directions.
-    fn add_direction_block(
+    /// The block of a camera's polynomials, carried over from their coefficients to parameters.
+    fn add_field_block(
         &mut self,
-        model: &Model,
         layout: &Layout,
         observations: &Observations,
         sums: &[ViewSums],
+        to_columns: &[DMatrix<f64>],
         camera_idx: usize,
     ) {
-        let to_legendre = model.cameras[camera_idx].basis.coefficients();
-        let terms = to_legendre.nrows() / 2;
-        let mut block = DMatrix::zeros(2 * terms, 2 * terms);
+        let to_columns = &to_columns[camera_idx];
+        let mut block = DMatrix::zeros(to_columns.nrows(), to_columns.nrows());
         for (view, sums) in observations.views.iter().zip(sums) {
-            if view.camera_idx != camera_idx {
-                continue;
-            }
-            for (pair, (a, b)) in [(0, 0), (0, 1), (1, 1)].into_iter().enumerate() {
-                let source = &sums.direction[pair];
-                for k in 0..terms {
-                    for l in 0..terms {
-                        block[(2 * l + a, 2 * k + b)] += source[(l, k)];
-                    }
-                }
+            if view.camera_idx == camera_idx {
+                block += &sums.field;
             }
         }
-        for k in 0..terms {
-            for l in 0..terms {
-                block[(2 * l + 1, 2 * k)] = block[(2 * k, 2 * l + 1)];
-            }
-        }
-        let range = layout.direction[camera_idx].clone();
-        let structured = to_legendre.tr_mul(&(block * to_legendre));
+        let carried = to_columns.tr_mul(&(block * to_columns));
+        let start = layout.cameras[camera_idx].direction.start;
         self.global
-            .view_mut((range.start, range.start), (range.len(), range.len()))
-            .copy_from(&structured);
+            .view_mut((start, start), carried.shape())
+            .copy_from(&carried);
     }
 
-    /// All that a view adds outside the field-by-field block.
-    fn add_view(&mut self, model: &Model, layout: &Layout, view: &ViewBlock, sums: &ViewSums) {
-        let direction = layout.direction[view.camera_idx].clone();
-        let structured = model.cameras[view.camera_idx]
-            .basis
-            .coefficients()
-            .tr_mul(&sums.direction_small);
+    /// All that a view adds outside the block of its camera's polynomials.
+    fn add_view(
+        &mut self,
+        layout: &Layout,
+        view: &super::observations::ViewBlock,
+        sums: &ViewSums,
+        to_columns: &DMatrix<f64>,
+    ) {
+        let carried = to_columns.tr_mul(&sums.field_small);
+        let start = layout.cameras[view.camera_idx].direction.start;
+        let field = start..start + carried.nrows();
         let gradient = sums.small.ncols() - 1;
         let coupling = &mut self.coupling[view.pose_idx];
         for k in 0..6 {
             let mut column = coupling.column_mut(k);
-            let mut rows = column.rows_range_mut(direction.clone());
-            rows += structured.column(k);
+            let mut rows = column.rows_range_mut(field.clone());
+            rows += carried.column(k);
         }
         self.poses[view.pose_idx] += sums.small.fixed_view::<6, 6>(0, 0);
         self.pose_gradients[view.pose_idx] += sums.small.fixed_view::<6, 1>(0, gradient);
-        let mut gradient_rows = self.global_gradient.rows_range_mut(direction.clone());
-        gradient_rows += structured.column(gradient);
-        // Where each small column behind the pose stands among the global parameters.
-        let extrinsics = layout.extrinsics[view.camera_idx].clone();
-        let targets = extrinsics
-            .into_iter()
-            .flat_map(|range| range.zip(6..12))
-            .chain(layout.board.clone().zip(12..))
-            .collect::<Vec<_>>();
+        let mut gradient_rows = self.global_gradient.rows_range_mut(field.clone());
+        gradient_rows += carried.column(gradient);
+        let targets: Vec<(usize, usize)> = fixed_columns(layout, view.camera_idx)
+            .enumerate()
+            .filter_map(|(k, global)| Some((global?, EXTRINSICS + k)))
+            .collect();
         for (global, small) in &targets {
             self.global_gradient[*global] += sums.small[(*small, gradient)];
             for k in 0..6 {
@@ -397,7 +269,7 @@ impl NormalEquations {
             for (other_global, other_small) in &targets {
                 self.global[(*global, *other_global)] += sums.small[(*small, *other_small)];
             }
-            for (row, value) in direction.clone().zip(structured.column(*small).iter()) {
+            for (row, value) in field.clone().zip(carried.column(*small).iter()) {
                 self.global[(row, *global)] += value;
                 self.global[(*global, row)] += value;
             }
@@ -405,13 +277,23 @@ impl NormalEquations {
     }
 
     fn add_priors(&mut self, model: &Model, layout: &Layout, priors: &Priors) {
-        for (camera_idx, range) in layout.direction.iter().enumerate() {
-            let camera = &model.cameras[camera_idx];
+        for ((camera, ranges), (priors, spline)) in model
+            .cameras
+            .iter()
+            .zip(&layout.cameras)
+            .zip(priors.cameras.iter().zip(&mut self.splines))
+        {
             let amounts = camera.basis.amounts(&camera.field.direction.polynomial);
-            for (k, row) in range.clone().enumerate() {
-                let weight = priors.direction[camera_idx][k];
+            let offset = camera.offset_amounts();
+            let direction = ranges.direction.clone().zip(amounts.iter().zip(&priors.direction));
+            let offset = ranges.offset.clone().zip(offset.iter().zip(&priors.offset));
+            for (row, (amount, weight)) in direction.chain(offset) {
                 self.global[(row, row)] += weight;
-                self.global_gradient[row] += weight * amounts[k];
+                self.global_gradient[row] += weight * amount;
+            }
+            if let (Some(block), Some(energy)) = (spline, &priors.thin_plate) {
+                block.band.add_scaled(priors.spline, energy);
+                block.gradient += energy.times(&camera.spline_amounts()) * priors.spline;
             }
         }
         for (row, term) in layout.board.clone().zip(&model.board_shape.terms) {
@@ -420,80 +302,413 @@ impl NormalEquations {
         }
     }
 
-    /// Eliminates the poses. `damping` scales up the diagonal (Marquardt); 0 leaves the Hessian.
+    /// Factorizes. `damping` scales up the diagonal (Marquardt); 0 leaves the Hessian.
     ///
     /// `None` if a block is not positive definite: something the data do not determine.
     pub fn reduce(&self, damping: f64) -> Option<Reduced> {
         let mut global = self.global.clone();
-        for k in 0..global.nrows() {
-            global[(k, k)] *= 1.0 + damping;
-        }
-        let mut right = -&self.global_gradient;
-        let mut pose_factors = Vec::with_capacity(self.poses.len());
-        for ((block, gradient), coupling) in self
+        scale_diagonal(&mut global, damping);
+        let poses: Vec<Matrix6<f64>> = self
             .poses
             .iter()
-            .zip(&self.pose_gradients)
-            .zip(&self.coupling)
+            .map(|block| {
+                let mut damped = *block;
+                for k in 0..6 {
+                    damped[(k, k)] *= 1.0 + damping;
+                }
+                damped
+            })
+            .collect();
+        if self.splines.iter().all(Option::is_none) {
+            self.reduce_poses(global, &poses)
+        } else {
+            self.reduce_splines(&global, &poses, damping)
+        }
+    }
+
+    /// Without splines: the poses go first.
+    fn reduce_poses(&self, mut global: DMatrix<f64>, poses: &[Matrix6<f64>]) -> Option<Reduced> {
+        let mut right = -&self.global_gradient;
+        let mut factors = Vec::with_capacity(poses.len());
+        for ((block, gradient), coupling) in
+            poses.iter().zip(&self.pose_gradients).zip(&self.coupling)
         {
-            let mut damped = *block;
-            for k in 0..6 {
-                damped[(k, k)] *= 1.0 + damping;
-            }
-            let factor = damped.cholesky()?;
+            let factor = block.cholesky()?;
             // With V = L L^T and Y = W L^-T, the pose takes Y Y^T off the global block.
             let mut y = coupling.transpose();
             factor.l_dirty().solve_lower_triangular_mut(&mut y);
             global.gemm_tr(-1.0, &y, &y, 1.0);
-            let solved = factor.solve(gradient);
-            right += coupling * solved;
-            pose_factors.push(factor);
+            right += coupling * factor.solve(gradient);
+            factors.push(factor);
         }
         Some(Reduced {
-            factor: global.cholesky()?,
+            border: global.cholesky()?,
             right,
-            pose_factors,
+            global_len: self.global_gradient.len(),
+            eliminated: Eliminated::Poses(factors),
+        })
+    }
+
+    /// With splines: they go first, each from its band.
+    fn reduce_splines(
+        &self,
+        global: &DMatrix<f64>,
+        poses: &[Matrix6<f64>],
+        damping: f64,
+    ) -> Option<Reduced> {
+        let global_len = global.nrows();
+        let size = global_len + 6 * poses.len();
+        let mut border = DMatrix::zeros(size, size);
+        let mut right = DVector::zeros(size);
+        border
+            .view_mut((0, 0), (global_len, global_len))
+            .copy_from(global);
+        right.rows_mut(0, global_len).copy_from(&-&self.global_gradient);
+        for (pose_idx, block) in poses.iter().enumerate() {
+            let at = global_len + 6 * pose_idx;
+            border.view_mut((at, at), (6, 6)).copy_from(block);
+            border
+                .view_mut((0, at), (global_len, 6))
+                .copy_from(&self.coupling[pose_idx]);
+            right
+                .rows_mut(at, 6)
+                .copy_from(&-self.pose_gradients[pose_idx]);
+        }
+        let eliminated: Vec<Option<EliminatedSpline>> = self
+            .splines
+            .par_iter()
+            .map(|block| match block {
+                None => Some(None),
+                Some(block) => block.eliminate(damping).map(Some),
+            })
+            .collect::<Option<_>>()?;
+        for (block, spline) in self.splines.iter().zip(&eliminated) {
+            if let (Some(block), Some(spline)) = (block, spline) {
+                // Y^T Y, the share of this spline in the border.
+                let share = &spline.y_transposed * spline.y_transposed.transpose();
+                let pulled = &spline.y_transposed * &spline.solved_gradient;
+                for (b, column) in block.columns.iter().enumerate() {
+                    right[*column] += pulled[b];
+                    for (a, row) in block.columns.iter().enumerate() {
+                        if row <= column {
+                            border[(*row, *column)] -= share[(a, b)];
+                        }
+                    }
+                }
+            }
+        }
+        border.fill_lower_triangle_with_upper_triangle();
+        Some(Reduced {
+            border: border.cholesky()?,
+            right,
+            global_len,
+            eliminated: Eliminated::Splines(
+                self.splines
+                    .iter()
+                    .zip(eliminated)
+                    .map(|(block, spline)| {
+                        Some((block.as_ref()?.columns.clone(), spline?))
+                    })
+                    .collect(),
+            ),
         })
     }
 
     /// The step that the (damped) equations ask for.
     pub fn step(&self, reduced: &Reduced) -> Step {
-        let global = reduced.factor.solve(&reduced.right);
-        let poses = self
-            .pose_gradients
-            .iter()
-            .zip(&self.coupling)
-            .zip(&reduced.pose_factors)
-            .map(|((gradient, coupling), factor)| {
-                let right: Vector6<f64> = -gradient - coupling.tr_mul(&global).fixed_rows::<6>(0);
-                factor.solve(&right)
-            })
-            .collect();
-        Step { global, poses }
+        let border = reduced.border.solve(&reduced.right);
+        match &reduced.eliminated {
+            Eliminated::Poses(factors) => {
+                let poses = self
+                    .pose_gradients
+                    .iter()
+                    .zip(&self.coupling)
+                    .zip(factors)
+                    .map(|((gradient, coupling), factor)| {
+                        let pulled = coupling.tr_mul(&border);
+                        factor.solve(&(-gradient - pulled.fixed_rows::<6>(0)))
+                    })
+                    .collect();
+                Step {
+                    splines: vec![DVector::zeros(0); self.splines.len()],
+                    global: border,
+                    poses,
+                }
+            }
+            Eliminated::Splines(splines) => {
+                let splines = splines
+                    .iter()
+                    .map(|spline| {
+                        spline.as_ref().map_or_else(
+                            || DVector::zeros(0),
+                            |(columns, spline)| {
+                                spline.back_substitute(
+                                    &-&spline.solved_gradient,
+                                    columns,
+                                    &border,
+                                )
+                            },
+                        )
+                    })
+                    .collect();
+                let global_len = reduced.global_len;
+                let poses = (0..self.poses.len())
+                    .map(|idx| border.fixed_rows::<6>(global_len + 6 * idx).into_owned())
+                    .collect();
+                Step {
+                    global: border.rows(0, global_len).into_owned(),
+                    poses,
+                    splines,
+                }
+            }
+        }
     }
 
-    /// By how much the linearized objective falls with a step of these equations.
-    pub fn predicted_decrease(&self, step: &Step) -> f64 {
+    /// By how much the linearized objective falls with a step of the equations damped so.
+    ///
+    /// The step solves `(H + mu D) x = -g`, so `-(2 g.x + x.H x) = -g.x + mu x.D x`.
+    pub fn predicted_decrease(&self, step: &Step, damping: f64) -> f64 {
         let mut linear = self.global_gradient.dot(&step.global);
-        let mut quadratic = (&self.global * &step.global).dot(&step.global);
-        for (((block, gradient), coupling), pose) in self
-            .poses
-            .iter()
-            .zip(&self.pose_gradients)
-            .zip(&self.coupling)
-            .zip(&step.poses)
+        let mut diagonal: f64 = (0..step.global.len())
+            .map(|k| self.global[(k, k)] * step.global[k].powi(2))
+            .sum();
+        for ((block, gradient), pose) in
+            self.poses.iter().zip(&self.pose_gradients).zip(&step.poses)
         {
             linear += gradient.dot(pose);
-            quadratic += (block * pose).dot(pose) + 2.0 * (coupling * pose).dot(&step.global);
+            diagonal += (0..6).map(|k| block[(k, k)] * pose[k].powi(2)).sum::<f64>();
         }
-        -(2.0 * linear + quadratic)
+        for (block, change) in self.splines.iter().zip(&step.splines) {
+            if let Some(block) = block {
+                linear += block.gradient.dot(change);
+                diagonal += (0..change.len())
+                    .map(|k| block.band.get(k, k) * change[k].powi(2))
+                    .sum::<f64>();
+            }
+        }
+        -linear + damping * diagonal
+    }
+}
+
+impl SplineBlock {
+    fn new(
+        sums: &SplineSums,
+        layout: &Layout,
+        camera_idx: usize,
+        poses: &[usize],
+        to_columns: &DMatrix<f64>,
+    ) -> Self {
+        let (rows, field_len) = (sums.band.size(), to_columns.nrows());
+        // Border columns that exist as parameters: a camera without extrinsics has none of them.
+        let fixed: Vec<(usize, usize)> = fixed_columns(layout, camera_idx)
+            .enumerate()
+            .filter_map(|(k, global)| Some((field_len + k, global?)))
+            .collect();
+        let fixed_len = fixed_columns(layout, camera_idx).count();
+        let pose_columns = poses.iter().enumerate().flat_map(|(k, pose_idx)| {
+            (0..6).map(move |c| {
+                (
+                    field_len + fixed_len + 6 * k + c,
+                    layout.global_len + 6 * pose_idx + c,
+                )
+            })
+        });
+        let kept: Vec<(usize, usize)> = fixed.into_iter().chain(pose_columns).collect();
+        let start = layout.cameras[camera_idx].direction.start;
+        let parameters = to_columns.ncols();
+        let columns: Vec<usize> = (start..start + parameters)
+            .chain(kept.iter().map(|(_, global)| *global))
+            .collect();
+        let mut border = vec![0.0; rows * columns.len()];
+        let source = nalgebra::DMatrixView::from_slice_with_strides(
+            &sums.border,
+            field_len,
+            rows,
+            1,
+            sums.border_len,
+        );
+        let carried = to_columns.tr_mul(&source);
+        for row in 0..rows {
+            let target = &mut border[row * columns.len()..][..columns.len()];
+            target[..parameters].copy_from_slice(carried.column(row).as_slice());
+            let source = &sums.border[row * sums.border_len..][..sums.border_len];
+            for (entry, (from, _)) in target[parameters..].iter_mut().zip(&kept) {
+                *entry = source[*from];
+            }
+        }
+        Self {
+            band: sums.band.clone(),
+            gradient: DVector::from_fn(rows, |row, _| {
+                sums.border[(row + 1) * sums.border_len - 1]
+            }),
+            border,
+            columns,
+        }
+    }
+
+    fn eliminate(&self, damping: f64) -> Option<EliminatedSpline> {
+        let mut band = self.band.clone();
+        band.scale_diagonal(1.0 + damping);
+        let factor = band.cholesky()?;
+        let mut y = self.border.clone();
+        factor.solve_lower(&mut y, self.columns.len());
+        let mut solved_gradient = self.gradient.clone();
+        factor.solve_lower_vector(&mut solved_gradient);
+        Some(EliminatedSpline {
+            // Row-major y is its transpose in column-major storage.
+            y_transposed: DMatrix::from_vec(self.columns.len(), self.band.size(), y),
+            solved_gradient,
+            factor,
+        })
+    }
+}
+
+/// The factorized equations.
+#[derive(Debug, Clone)]
+pub struct Reduced {
+    /// Of the global parameters, and of the poses behind them if splines were eliminated.
+    border: Cholesky<f64, Dyn>,
+    right: DVector<f64>,
+    global_len: usize,
+    eliminated: Eliminated,
+}
+
+#[derive(Debug, Clone)]
+enum Eliminated {
+    Poses(Vec<Cholesky<f64, nalgebra::Const<6>>>),
+    /// Border columns and factor per camera with a spline.
+    Splines(Vec<Option<(Vec<usize>, EliminatedSpline)>>),
+}
+
+/// `F = L L^T`, `Y = L^-1 E`, `L^-1 gradient`.
+#[derive(Debug, Clone)]
+struct EliminatedSpline {
+    factor: BandedCholesky,
+    y_transposed: DMatrix<f64>,
+    solved_gradient: DVector<f64>,
+}
+
+impl EliminatedSpline {
+    /// The knots' part of a solution: `L^-T (solved - Y border)`.
+    fn back_substitute(
+        &self,
+        solved: &DVector<f64>,
+        columns: &[usize],
+        border: &DVector<f64>,
+    ) -> DVector<f64> {
+        let own = DVector::from_iterator(columns.len(), columns.iter().map(|c| border[*c]));
+        let mut knots = solved - self.y_transposed.tr_mul(&own);
+        self.factor.solve_upper_vector(&mut knots);
+        knots
     }
 }
 
 impl Reduced {
-    /// Covariance of the global parameters (poses marginalized), if the weights are inverse
-    /// variances and the damping was 0.
+    /// Covariance of the global parameters (everything else marginalized), if the weights are
+    /// inverse variances and the damping was 0.
     pub fn global_covariance(&self) -> DMatrix<f64> {
-        self.factor.inverse()
+        let n = self.global_len;
+        let size = self.border.l_dirty().nrows();
+        let mut units = DMatrix::zeros(size, n);
+        units.fill_with_identity();
+        self.border.solve_mut(&mut units);
+        units.rows(0, n).into_owned()
+    }
+
+    /// Natural logarithm of the determinant of the whole Hessian.
+    pub fn ln_determinant(&self) -> f64 {
+        let l = self.border.l_dirty();
+        let border = 2.0 * (0..l.nrows()).map(|k| l[(k, k)].ln()).sum::<f64>();
+        let eliminated: f64 = match &self.eliminated {
+            Eliminated::Poses(factors) => factors
+                .iter()
+                .map(|f| 2.0 * (0..6).map(|k| f.l_dirty()[(k, k)].ln()).sum::<f64>())
+                .sum(),
+            Eliminated::Splines(splines) => splines
+                .iter()
+                .flatten()
+                .map(|(_, spline)| spline.factor.ln_determinant())
+                .sum(),
+        };
+        border + eliminated
+    }
+
+    /// `tr(matrix covariance)` over the knots of one camera's spline, by Hutchinson's estimator
+    /// with the given probes (entries +1 and -1). 0 without a spline.
+    pub fn spline_trace(
+        &self,
+        camera_idx: usize,
+        matrix: &BandedMatrix,
+        probes: &[DVector<f64>],
+    ) -> f64 {
+        let Eliminated::Splines(splines) = &self.eliminated else {
+            return 0.0;
+        };
+        let Some(Some((columns, spline))) = splines.get(camera_idx) else {
+            return 0.0;
+        };
+        let sum: f64 = probes
+            .par_iter()
+            .map(|probe| {
+                let mut solved = probe.clone();
+                spline.factor.solve_lower_vector(&mut solved);
+                let pulled = &spline.y_transposed * &solved;
+                let mut border = DVector::zeros(self.right.len());
+                for (column, value) in columns.iter().zip(pulled.iter()) {
+                    border[*column] = -value;
+                }
+                self.border.solve_mut(&mut border);
+                let knots = spline.back_substitute(&solved, columns, &border);
+                matrix.times(probe).dot(&knots)
+            })
+            .collect::<Vec<f64>>()
+            .iter()
+            .sum();
+        sum / probes.len() as f64
+    }
+}
+
+/// Where extrinsics and board shape stand among the global parameters, in the order of a view's
+/// small columns behind the pose; `None` for extrinsics that are held.
+fn fixed_columns(layout: &Layout, camera_idx: usize) -> impl Iterator<Item = Option<usize>> + '_ {
+    let extrinsics = layout.cameras[camera_idx].extrinsics.as_ref();
+    (0..6)
+        .map(move |k| extrinsics.map(|range| range.start + k))
+        .chain(layout.board.clone().map(Some))
+}
+
+/// What a unit of each of a camera's polynomial parameters (columns: direction, then offset) does
+/// to the coefficients of its components (rows, see [`Components`]).
+fn parameters_to_columns(camera: &CameraModel) -> DMatrix<f64> {
+    let components = Components::of(camera);
+    let direction = camera.basis.coefficients();
+    let offset_len = camera.offset_amounts().len();
+    let mut map = DMatrix::zeros(components.len(), direction.ncols() + offset_len);
+    for component in 0..2 {
+        for k in 0..components.terms(component) {
+            let source = direction.row(2 * k + component);
+            map.view_mut(
+                (components.start(component) + k, 0),
+                (1, direction.ncols()),
+            )
+            .copy_from(&source);
+        }
+    }
+    if let Some(offset) = &camera.field.offset {
+        let norms = legendre_norms(offset.polynomial.degree);
+        for component in 2..4 {
+            let terms = components.terms(component);
+            for k in 0..terms {
+                let column = direction.ncols() + (component - 2) * terms + k;
+                map[(components.start(component) + k, column)] = 1.0 / norms[k];
+            }
+        }
+    }
+    map
+}
+
+fn scale_diagonal(matrix: &mut DMatrix<f64>, damping: f64) {
+    for k in 0..matrix.nrows() {
+        matrix[(k, k)] *= 1.0 + damping;
     }
 }

@@ -3,9 +3,11 @@
 
 use crate::board::BoardSpec;
 use crate::dataset::View;
-use crate::field::{BaseLens, polynomial};
+use crate::field::polynomial::{self, Polynomial};
+use crate::field::spline::AxisWeights;
+use crate::field::{FieldSample, RayField};
 use crate::geometry::{PixelPoint, SensorSize};
-use nalgebra::{DMatrix, Matrix2, Vector2, Vector3};
+use nalgebra::{DMatrix, Matrix2, RowVector2, Vector2, Vector3};
 
 /// All views offered to an adjustment.
 #[derive(Debug, Clone)]
@@ -143,41 +145,97 @@ fn median_sigma_px(views: &[View]) -> f64 {
     sigmas.get(sigmas.len() / 2).copied().unwrap_or(1.0)
 }
 
-/// The values of the fixed functions at the corners of one view: base lens and Legendre products.
+/// The values of the fixed functions at the corners of one view: base lens, Legendre products and
+/// the weights of the spline's knots.
 #[derive(Debug, Clone)]
 pub struct ViewBasis {
     /// Base lens at each corner: half-angle vector and derivative per px.
     pub base: Vec<(Vector2<f64>, Matrix2<f64>)>,
-    /// Products, one row per corner.
+    /// Products of the highest degree in use, one row per corner; those of lower degree come
+    /// first.
     pub products: DMatrix<f64>,
     /// Their derivatives by u, 1/px.
     pub products_du: DMatrix<f64>,
     /// Their derivatives by v, 1/px.
     pub products_dv: DMatrix<f64>,
+    /// Weights along u and v at each corner; empty without a spline.
+    pub knots: Vec<(AxisWeights, AxisWeights)>,
 }
 
 impl ViewBasis {
-    /// Evaluates the fixed functions at the corners of a view.
-    pub fn new(view: &ViewBlock, sensor: SensorSize, base: BaseLens, degree: usize) -> Self {
+    /// Evaluates the fixed functions of a field at the corners of a view.
+    pub fn new(view: &ViewBlock, field: &RayField) -> Self {
+        let degree = field
+            .offset
+            .as_ref()
+            .map_or(0, |offset| offset.polynomial.degree)
+            .max(field.direction.polynomial.degree);
         let (n, k) = (view.corners.len(), polynomial::term_count(degree));
         let mut basis = Self {
             base: Vec::with_capacity(n),
             products: DMatrix::zeros(n, k),
             products_du: DMatrix::zeros(n, k),
             products_dv: DMatrix::zeros(n, k),
+            knots: Vec::new(),
         };
-        let center = sensor.center();
+        let center = field.sensor.center();
         let mut row = Vec::with_capacity(k);
         for (r, corner) in view.corners.iter().enumerate() {
             let offset = Vector2::new(corner.pixel.u - center.u, corner.pixel.v - center.v);
-            basis.base.push(base.evaluate(&offset));
-            polynomial::basis(sensor, degree, corner.pixel, &mut row);
+            basis.base.push(field.base.evaluate(&offset));
+            polynomial::basis(field.sensor, degree, corner.pixel, &mut row);
             for (c, [value, du, dv]) in row.iter().enumerate() {
                 basis.products[(r, c)] = *value;
                 basis.products_du[(r, c)] = *du;
                 basis.products_dv[(r, c)] = *dv;
             }
         }
+        if let Some(spline) = &field.direction.spline {
+            basis.knots = view
+                .corners
+                .iter()
+                .map(|corner| {
+                    (
+                        spline.grid.weights_u(corner.pixel.u),
+                        spline.grid.weights_v(corner.pixel.v),
+                    )
+                })
+                .collect();
+        }
         basis
+    }
+
+    /// The field's numbers at a corner.
+    pub fn sample(&self, field: &RayField, corner_idx: usize) -> FieldSample {
+        let (mut s, mut ds) = self.base[corner_idx];
+        self.add_polynomial(&field.direction.polynomial, corner_idx, &mut s, &mut ds);
+        if let (Some(spline), Some((u, v))) =
+            (&field.direction.spline, self.knots.get(corner_idx))
+        {
+            let (value, derivative) = spline.weighted(u, v);
+            s += value;
+            ds += derivative;
+        }
+        let (mut m_mm, mut dm) = (Vector2::zeros(), Matrix2::zeros());
+        if let Some(offset) = &field.offset {
+            self.add_polynomial(&offset.polynomial, corner_idx, &mut m_mm, &mut dm);
+        }
+        FieldSample { s, ds, m_mm, dm }
+    }
+
+    fn add_polynomial(
+        &self,
+        polynomial: &Polynomial,
+        corner_idx: usize,
+        value: &mut Vector2<f64>,
+        derivative: &mut Matrix2<f64>,
+    ) {
+        for (k, c) in polynomial.coefficients.iter().enumerate() {
+            *value += c * self.products[(corner_idx, k)];
+            *derivative += c * RowVector2::new(
+                self.products_du[(corner_idx, k)],
+                self.products_dv[(corner_idx, k)],
+            );
+        }
     }
 }

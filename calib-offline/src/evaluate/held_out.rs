@@ -8,6 +8,7 @@ use crate::dataset::Corner;
 use crate::field::{MeasureError, Rig};
 use crate::init::rig::start_rig;
 use crate::joint::{Estimate, estimate};
+use crate::progress::Progress;
 use rayon::prelude::*;
 
 /// Errors on held-out boards, all folds together.
@@ -35,10 +36,14 @@ pub fn fold_of(pose_idx: usize, folds: usize) -> usize {
 /// Estimates each fold from the other folds' poses and measures its boards.
 ///
 /// Cost: `folds` estimates, run in parallel with ordered results.
-pub fn held_out(observations: &Observations, folds: usize) -> HeldOut {
+pub fn held_out(observations: &Observations, folds: usize, progress: &dyn Progress) -> HeldOut {
     let per_fold: Vec<Option<HeldOut>> = (0..folds)
         .into_par_iter()
-        .map(|fold| evaluate_fold(observations, folds, fold))
+        .map(|fold| {
+            let result = evaluate_fold(observations, folds, fold);
+            progress.advance();
+            result
+        })
         .collect();
     let mut all = HeldOut::default();
     for fold in per_fold {

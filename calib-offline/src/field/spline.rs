@@ -110,7 +110,11 @@ impl Spline {
 
     /// Value, and derivative by (u, v) per px (columns).
     pub fn evaluate(&self, pixel: PixelPoint) -> (Vector2<f64>, Matrix2<f64>) {
-        let (wu, wv) = (self.grid.weights_u(pixel.u), self.grid.weights_v(pixel.v));
+        self.weighted(&self.grid.weights_u(pixel.u), &self.grid.weights_v(pixel.v))
+    }
+
+    /// [`Self::evaluate`] with the weights of the pixel given.
+    pub fn weighted(&self, wu: &AxisWeights, wv: &AxisWeights) -> (Vector2<f64>, Matrix2<f64>) {
         let mut value = Vector2::zeros();
         let mut derivative = Matrix2::zeros();
         for j in 0..4 {

@@ -3,7 +3,7 @@
 use super::bearing_pose::{bearing_pose, is_collinear};
 use super::{InitError, MIN_CORNERS, MIN_POSES};
 use crate::adjust::levenberg::{self, Settings};
-use crate::adjust::normal_equations::{self, Priors};
+use crate::adjust::normal_equations::{self, CameraPriors, Priors};
 use crate::adjust::observations::ViewBlock;
 use crate::adjust::robust::reweight;
 use crate::adjust::{CameraModel, Model, Observations};
@@ -11,7 +11,7 @@ use crate::board::BoardShape;
 use crate::field::structured::StructuredBasis;
 use crate::field::{BaseLens, Projection, RayField, transport};
 use crate::geometry::{RigidTransform, SensorSize};
-use nalgebra::{DVector, Vector2, Vector3};
+use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
 
 /// Focal lengths tried, in sensor widths: from a 150 degree perspective lens to a telephoto.
@@ -206,17 +206,17 @@ fn adjust_cubic(
     rounds: usize,
     iterations: usize,
 ) -> Option<(Model, f64)> {
-    let basis = StructuredBasis::new(field.sensor, CUBIC, None);
+    let camera = CameraModel {
+        basis: StructuredBasis::new(field.sensor, CUBIC, None),
+        field,
+        camera_from_rig: RigidTransform::identity(),
+    };
     let priors = Priors {
-        direction: vec![DVector::zeros(basis.len())],
+        cameras: vec![CameraPriors::free(&camera)],
         board: 0.0,
     };
     let mut model = Model {
-        cameras: vec![CameraModel {
-            field,
-            basis,
-            camera_from_rig: RigidTransform::identity(),
-        }],
+        cameras: vec![camera],
         rig_from_board: poses,
         board_shape: BoardShape::default(),
     };

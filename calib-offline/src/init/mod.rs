@@ -10,11 +10,8 @@ pub mod bearing_pose;
 pub mod focal_scan;
 pub mod rig;
 
+pub use crate::dataset::sufficiency::MIN_POSES;
 use crate::geometry::SensorSize;
-
-/// Fewest poses from which a camera can be calibrated: two planes leave the focal length open for
-/// motions that users do make.
-pub const MIN_POSES: usize = 3;
 
 /// Fewest corners that place a board.
 pub const MIN_CORNERS: usize = 6;

@@ -212,9 +212,9 @@ impl State {
             .smoothness
             .update(&self.model, &layout, &reduced.global_covariance());
         let penalized: usize = priors
-            .direction
+            .cameras
             .iter()
-            .map(|d| d.iter().filter(|w| **w > 0.0).count())
+            .map(|c| c.direction.iter().filter(|w| **w > 0.0).count())
             .sum();
         self.effective_parameters = (layout.global_len - penalized) as f64
             + smooth

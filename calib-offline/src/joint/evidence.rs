@@ -1,7 +1,7 @@
 //! How strongly smoothness holds and how much a corner counts, from the data themselves.
 
 use crate::adjust::model::Layout;
-use crate::adjust::normal_equations::Priors;
+use crate::adjust::normal_equations::{CameraPriors, Priors};
 use crate::adjust::robust::StudentT;
 use crate::adjust::{Model, Observations};
 use nalgebra::{DMatrix, Vector2};
@@ -91,17 +91,13 @@ impl Smoothness {
 
     /// As priors of an adjustment.
     pub fn priors(&self, model: &Model, board: f64) -> Priors {
-        let mut direction: Vec<_> = model
-            .cameras
-            .iter()
-            .map(|camera| nalgebra::DVector::zeros(camera.basis.len()))
-            .collect();
+        let mut cameras: Vec<_> = model.cameras.iter().map(CameraPriors::free).collect();
         for group in &self.groups {
             for member in &group.members {
-                direction[group.camera_idx][*member] = group.precision;
+                cameras[group.camera_idx].direction[*member] = group.precision;
             }
         }
-        Priors { direction, board }
+        Priors { cameras, board }
     }
 
     /// One fixed-point step of every weight (MacKay): `lambda <- gamma / |a|^2` with
@@ -112,7 +108,7 @@ impl Smoothness {
         for group in &mut self.groups {
             let camera = &model.cameras[group.camera_idx];
             let amounts = camera.basis.amounts(&camera.field.direction.polynomial);
-            let offset = layout.direction[group.camera_idx].start;
+            let offset = layout.cameras[group.camera_idx].direction.start;
             let trace: f64 = group
                 .members
                 .iter()

@@ -1,0 +1,135 @@
+//! The procedure from top to bottom, one call per step: the file to read first.
+//!
+//! A dataset's corners become observations; initialization finds lenses and poses; the joint
+//! estimate adjusts everything; held-out boards judge it; the record says all of it.
+
+mod summary;
+
+use crate::adjust::Observations;
+use crate::dataset::corners::load_corners;
+use crate::dataset::split::without_excluded;
+use crate::dataset::sufficiency::check_sufficiency;
+use crate::dataset::{Dataset, View};
+use crate::detect::{self, DetectSettings};
+use crate::error::Error;
+use crate::evaluate::held_out::{HeldOut, held_out};
+use crate::evaluate::verdict::Thresholds;
+use crate::init::rig::start_rig;
+use crate::joint::estimate;
+use crate::progress::Progress;
+use crate::report::Calibration;
+use std::collections::BTreeSet;
+
+/// How to calibrate. Nothing here needs to be chosen by the user.
+#[derive(Debug, Clone)]
+pub struct CalibrateSettings {
+    /// Poses left out besides those of the manifest.
+    pub exclude: BTreeSet<usize>,
+    /// Folds of the held-out check; 0 leaves it out.
+    pub folds: usize,
+    /// What counts as good.
+    pub thresholds: Thresholds,
+    /// How images are searched, if the dataset has no corners.
+    pub detect: DetectSettings,
+}
+
+impl Default for CalibrateSettings {
+    fn default() -> Self {
+        Self {
+            exclude: BTreeSet::new(),
+            folds: 5,
+            thresholds: Thresholds::default(),
+            detect: DetectSettings::default(),
+        }
+    }
+}
+
+/// Corners of a dataset, and where they come from.
+#[derive(Debug, Clone)]
+pub struct Corners {
+    /// The views.
+    pub views: Vec<View>,
+    /// The verdicts per image, if the corners were detected and not read.
+    pub detection: Option<detect::Detection>,
+}
+
+/// Corners from `corners.csv` if there is one, else from the images.
+///
+/// # Errors
+/// Unreadable or inconsistent files; images that cannot be labelled.
+pub fn corners(
+    dataset: &Dataset,
+    settings: &DetectSettings,
+    progress: &dyn Progress,
+) -> Result<Corners, Error> {
+    if let Some(views) = load_corners(dataset)? {
+        return Ok(Corners {
+            views,
+            detection: None,
+        });
+    }
+    let detection = detect::detect_dataset(dataset, settings, progress)?;
+    Ok(Corners {
+        views: detection.views.clone(),
+        detection: Some(detection),
+    })
+}
+
+/// Calibrates a dataset.
+///
+/// Deterministic: the same input gives the same result on the same build, whatever the number of
+/// threads.
+///
+/// # Errors
+/// The stage's own error: unusable input, or data that cannot determine the answer.
+pub fn calibrate(
+    dataset: &Dataset,
+    settings: &CalibrateSettings,
+    progress: &dyn Progress,
+) -> Result<Calibration, Error> {
+    let corners = corners(dataset, &settings.detect, progress)?;
+    calibrate_corners(dataset, &corners, settings, progress)
+}
+
+/// [`calibrate`] from corners that are there already.
+///
+/// # Errors
+/// Data that cannot determine the answer.
+pub fn calibrate_corners(
+    dataset: &Dataset,
+    corners: &Corners,
+    settings: &CalibrateSettings,
+    progress: &dyn Progress,
+) -> Result<Calibration, Error> {
+    let excluded = &dataset.excluded_poses | &settings.exclude;
+    let selection = without_excluded(corners.views.clone(), &excluded);
+    check_sufficiency(dataset, &selection.used)?;
+    let sensors = dataset.cameras.iter().map(|camera| camera.sensor).collect();
+    let observations = Observations::new(dataset.board, sensors, &selection.used);
+
+    progress.begin("initialize", 1);
+    let start = start_rig(&observations)?;
+    progress.end();
+
+    progress.begin("estimate", 1);
+    let estimate = estimate(&observations, &start)?;
+    progress.end();
+
+    let unseen = if observations.poses.len() >= 2 * crate::dataset::sufficiency::MIN_POSES {
+        progress.begin("check on held-out poses", settings.folds);
+        let unseen = held_out(&observations, settings.folds, progress);
+        progress.end();
+        unseen
+    } else {
+        HeldOut::default()
+    };
+    Ok(summary::record(&summary::Parts {
+        dataset,
+        corners,
+        excluded: &excluded,
+        observations: &observations,
+        estimate: &estimate,
+        held_out: &unseen,
+        thresholds: &settings.thresholds,
+    }))
+}
