@@ -3,6 +3,7 @@
 pub mod adjust;
 pub mod atomic_file;
 pub mod board;
+pub mod cli;
 pub mod dataset;
 pub mod evaluate;
 pub mod field;

@@ -10,14 +10,20 @@
 
 pub mod matches;
 pub mod optics;
+pub mod output;
+pub mod pattern;
 pub mod preset;
 pub mod random;
+pub mod render;
 pub mod scene;
 pub mod stage;
+pub mod target;
 
 pub use matches::{MatchSet, TrueMatch};
 pub use optics::CameraOptics;
+pub use output::{ImageDepth, OutputSettings, SimulateError, SimulateSummary, write_dataset};
 pub use preset::OpticsKind;
+pub use render::RenderSettings;
 pub use scene::{Scene, SceneError, SceneSettings};
 
 #[cfg(test)]

@@ -12,10 +12,10 @@ use super::stage::{Mount, Placement};
 use crate::geometry::{PixelPoint, RigidTransform, SensorSize, so3};
 use clap::ValueEnum;
 use nalgebra::Vector3;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Kinds of optics; both cameras of a rig are of the same kind unless it says otherwise.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum OpticsKind {
     /// Pinhole with Brown-Conrady distortion.
@@ -57,6 +57,23 @@ impl OpticsKind {
         Self::Telecentric,
         Self::Unequal,
     ];
+
+    /// Its name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Brown => "brown",
+            Self::Paper => "paper",
+            Self::Bumps => "bumps",
+            Self::Window => "window",
+            Self::Port => "port",
+            Self::Dome => "dome",
+            Self::Fisheye => "fisheye",
+            Self::Wide => "wide",
+            Self::Telephoto => "telephoto",
+            Self::Telecentric => "telecentric",
+            Self::Unequal => "unequal",
+        }
+    }
 }
 
 /// A rig and the stage before it.

@@ -1,21 +1,24 @@
 //! A stereo rig before a chessboard on a rotation stage, and what its cameras record.
 
+use super::matches::{contains, convex_hull};
 use super::optics::CameraOptics;
+use super::pattern::Pattern;
 use super::preset::{self, OpticsKind, RigPreset};
 use super::random::{self, Purpose};
+use super::render::{PlateView, RenderSettings, Rendered};
 use super::stage::{self, Placement, Wobble};
 use crate::board::BoardSpec;
 use crate::dataset::{Corner, View};
 use crate::geometry::{PixelPoint, Ray, RigidTransform, SensorSize};
 use nalgebra::Vector3;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A corner seen at a flatter angle than this against the board's normal (75 degrees) is lost to
 /// any detector.
 const MIN_FACING_COS: f64 = 0.26;
 
 /// What to simulate. The default is the standard dataset of the pinhole rig, free of noise.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SceneSettings {
     /// Optics and rig.
     pub optics: OpticsKind,
@@ -280,6 +283,60 @@ impl Scene {
         let ray = self.true_ray_in_left(camera_idx, pixel)?;
         let facing = ray.direction.dot(&left_from_board.rotation.column(2));
         (facing > MIN_FACING_COS).then_some(pixel)
+    }
+
+    /// The board at a pose as a camera takes it, sensor noise included.
+    ///
+    /// `camera_idx` and `pose` must exist.
+    pub fn render_board(
+        &self,
+        camera_idx: usize,
+        pose: usize,
+        settings: &RenderSettings,
+    ) -> Rendered {
+        let camera_from_left = self.left_from_camera[camera_idx].inverse();
+        let view = PlateView {
+            camera: &self.cameras[camera_idx],
+            camera_from_plate: camera_from_left * self.true_poses[pose],
+            pattern: Pattern::Chessboard(self.settings.board),
+            bow_mm: self.settings.bow_mm,
+        };
+        let mut image = view.render(settings);
+        if settings.noise_levels > 0.0 {
+            image.add_noise(settings.noise_levels, self.settings.seed, camera_idx, pose);
+        }
+        image
+    }
+
+    /// Share of a camera's image that lies inside the hull of all its corners; of a fisheye's
+    /// sensor only the image circle counts.
+    pub fn hull_share(&self, camera_idx: usize) -> f64 {
+        let Some(camera) = self.cameras.get(camera_idx) else {
+            return 0.0;
+        };
+        let board = &self.settings.board;
+        let mut corners = Vec::new();
+        for pose in 0..self.true_poses.len() {
+            for row in 0..board.rows {
+                for col in 0..board.cols {
+                    corners.extend(self.true_corner(camera_idx, pose, row, col));
+                }
+            }
+        }
+        let hull = convex_hull(corners);
+        let sensor = camera.sensor();
+        let (mut in_image, mut in_hull) = (0, 0);
+        for k in 0..64 * 48 {
+            let pixel = PixelPoint::new(
+                (f64::from(k % 64) + 0.5) / 64.0 * f64::from(sensor.width) - 0.5,
+                (f64::from(k / 64) + 0.5) / 48.0 * f64::from(sensor.height) - 0.5,
+            );
+            if camera.ray(pixel).is_some() {
+                in_image += 1;
+                in_hull += i32::from(contains(&hull, pixel));
+            }
+        }
+        f64::from(in_hull) / f64::from(in_image.max(1))
     }
 
     /// What a detector would report: every visible corner with noise, some missing, some wrong.
