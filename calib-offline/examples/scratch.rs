@@ -66,7 +66,10 @@ fn main() {
     for s in &e.smoothness {
         println!("{s:?}");
     }
-    let h = held_out(&obs, 5);
+    for c in &e.choices {
+        println!("{c:?}");
+    }
+    let h = held_out(&obs, 5, &calib_offline::progress::Silent);
     let rms = |v: &[f64]| (v.iter().map(|x| x * x).sum::<f64>() / v.len() as f64).sqrt();
     let med = |v: &[f64]| {
         let mut v: Vec<f64> = v.iter().map(|x| x.abs()).collect();

@@ -95,8 +95,7 @@ impl BandedMatrix {
             for column in first..row {
                 let column_first = column.saturating_sub(self.half_bandwidth).max(first);
                 let shift_row = self.half_bandwidth + column_first - row;
-                let shift_column =
-                    column * width + self.half_bandwidth + column_first - column;
+                let shift_column = column * width + self.half_bandwidth + column_first - column;
                 let count = column - column_first;
                 let dot = dot(
                     &current[shift_row..shift_row + count],
@@ -122,7 +121,12 @@ impl BandedMatrix {
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut lanes = [0.0; 8];
     let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
-    let tail: f64 = a8.remainder().iter().zip(b8.remainder()).map(|(x, y)| x * y).sum();
+    let tail: f64 = a8
+        .remainder()
+        .iter()
+        .zip(b8.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
     for (x, y) in a8.zip(b8) {
         for k in 0..8 {
             lanes[k] += x[k] * y[k];
@@ -256,10 +260,15 @@ mod tests {
         let columns = 45;
         // Leading zero rows, as pose columns have.
         let entry = |row: usize, column: usize| {
-            if row < column { 0.0 } else { ((row * 5 + column) as f64).sin() }
+            if row < column {
+                0.0
+            } else {
+                ((row * 5 + column) as f64).sin()
+            }
         };
-        let mut matrix: Vec<f64> =
-            (0..60 * columns).map(|at| entry(at / columns, at % columns)).collect();
+        let mut matrix: Vec<f64> = (0..60 * columns)
+            .map(|at| entry(at / columns, at % columns))
+            .collect();
         cholesky.solve_lower(&mut matrix, columns);
         for column in 0..columns {
             let mut single = DVector::from_fn(60, |row, _| entry(row, column));

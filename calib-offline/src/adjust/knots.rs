@@ -102,7 +102,11 @@ mod tests {
 
     #[test]
     fn a_plane_has_no_energy_and_a_kink_has() {
-        let grid = SplineGrid { sensor: SensorSize::new(640, 480), cells_u: 5, cells_v: 4 };
+        let grid = SplineGrid {
+            sensor: SensorSize::new(640, 480),
+            cells_u: 5,
+            cells_v: 4,
+        };
         let order = KnotOrder::new(grid);
         let energy = order.thin_plate();
         let with = |f: fn(f64, f64) -> f64| {

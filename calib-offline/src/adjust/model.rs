@@ -142,7 +142,10 @@ impl Model {
         let mut next = self.clone();
         for (idx, camera) in next.cameras.iter_mut().enumerate() {
             let ranges = &layout.cameras[idx];
-            let amounts = step.global.rows_range(ranges.direction.clone()).into_owned();
+            let amounts = step
+                .global
+                .rows_range(ranges.direction.clone())
+                .into_owned();
             camera
                 .basis
                 .add_to(&amounts, &mut camera.field.direction.polynomial);

@@ -185,7 +185,8 @@ impl NormalEquations {
                 assembly::view_sums(model, observations, view, basis, weights)
             })
             .collect();
-        let to_columns: Vec<DMatrix<f64>> = model.cameras.iter().map(parameters_to_columns).collect();
+        let to_columns: Vec<DMatrix<f64>> =
+            model.cameras.iter().map(parameters_to_columns).collect();
         for camera_idx in 0..model.cameras.len() {
             equations.add_field_block(layout, observations, &sums, &to_columns, camera_idx);
         }
@@ -202,10 +203,18 @@ impl NormalEquations {
                     .filter(|k| observations.views[*k].camera_idx == camera_idx)
                     .collect();
                 let views: Vec<_> = own.iter().map(|k| (&bases[*k], &sums[*k])).collect();
-                let poses: Vec<usize> =
-                    own.iter().map(|k| observations.views[*k].pose_idx).collect();
+                let poses: Vec<usize> = own
+                    .iter()
+                    .map(|k| observations.views[*k].pose_idx)
+                    .collect();
                 let sums = assembly::spline_sums(camera, &order, &views);
-                Some(SplineBlock::new(&sums, layout, camera_idx, &poses, &to_columns[camera_idx]))
+                Some(SplineBlock::new(
+                    &sums,
+                    layout,
+                    camera_idx,
+                    &poses,
+                    &to_columns[camera_idx],
+                ))
             })
             .collect();
         equations.add_priors(model, layout, priors);
@@ -285,7 +294,10 @@ impl NormalEquations {
         {
             let amounts = camera.basis.amounts(&camera.field.direction.polynomial);
             let offset = camera.offset_amounts();
-            let direction = ranges.direction.clone().zip(amounts.iter().zip(&priors.direction));
+            let direction = ranges
+                .direction
+                .clone()
+                .zip(amounts.iter().zip(&priors.direction));
             let offset = ranges.offset.clone().zip(offset.iter().zip(&priors.offset));
             for (row, (amount, weight)) in direction.chain(offset) {
                 self.global[(row, row)] += weight;
@@ -363,7 +375,9 @@ impl NormalEquations {
         border
             .view_mut((0, 0), (global_len, global_len))
             .copy_from(global);
-        right.rows_mut(0, global_len).copy_from(&-&self.global_gradient);
+        right
+            .rows_mut(0, global_len)
+            .copy_from(&-&self.global_gradient);
         for (pose_idx, block) in poses.iter().enumerate() {
             let at = global_len + 6 * pose_idx;
             border.view_mut((at, at), (6, 6)).copy_from(block);
@@ -406,9 +420,7 @@ impl NormalEquations {
                 self.splines
                     .iter()
                     .zip(eliminated)
-                    .map(|(block, spline)| {
-                        Some((block.as_ref()?.columns.clone(), spline?))
-                    })
+                    .map(|(block, spline)| Some((block.as_ref()?.columns.clone(), spline?)))
                     .collect(),
             ),
         })
@@ -442,11 +454,7 @@ impl NormalEquations {
                         spline.as_ref().map_or_else(
                             || DVector::zeros(0),
                             |(columns, spline)| {
-                                spline.back_substitute(
-                                    &-&spline.solved_gradient,
-                                    columns,
-                                    &border,
-                                )
+                                spline.back_substitute(&-&spline.solved_gradient, columns, &border)
                             },
                         )
                     })
@@ -538,9 +546,7 @@ impl SplineBlock {
         }
         Self {
             band: sums.band.clone(),
-            gradient: DVector::from_fn(rows, |row, _| {
-                sums.border[(row + 1) * sums.border_len - 1]
-            }),
+            gradient: DVector::from_fn(rows, |row, _| sums.border[(row + 1) * sums.border_len - 1]),
             border,
             columns,
         }
@@ -687,11 +693,8 @@ fn parameters_to_columns(camera: &CameraModel) -> DMatrix<f64> {
     for component in 0..2 {
         for k in 0..components.terms(component) {
             let source = direction.row(2 * k + component);
-            map.view_mut(
-                (components.start(component) + k, 0),
-                (1, direction.ncols()),
-            )
-            .copy_from(&source);
+            map.view_mut((components.start(component) + k, 0), (1, direction.ncols()))
+                .copy_from(&source);
         }
     }
     if let Some(offset) = &camera.field.offset {

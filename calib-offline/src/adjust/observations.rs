@@ -209,8 +209,7 @@ impl ViewBasis {
     pub fn sample(&self, field: &RayField, corner_idx: usize) -> FieldSample {
         let (mut s, mut ds) = self.base[corner_idx];
         self.add_polynomial(&field.direction.polynomial, corner_idx, &mut s, &mut ds);
-        if let (Some(spline), Some((u, v))) =
-            (&field.direction.spline, self.knots.get(corner_idx))
+        if let (Some(spline), Some((u, v))) = (&field.direction.spline, self.knots.get(corner_idx))
         {
             let (value, derivative) = spline.weighted(u, v);
             s += value;

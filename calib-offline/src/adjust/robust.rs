@@ -13,6 +13,9 @@ const CANDIDATES: [f64; 6] = [3.0, 4.0, 6.0, 10.0, 20.0, 1000.0];
 /// A residual beyond this many standard deviations is no corner, whatever the tails.
 const REJECT_BEYOND_SIGMA: f64 = 8.0;
 
+/// Logarithm of the density of outliers, 1/px^2: anywhere on a megapixel.
+const LN_OUTLIER_DENSITY: f64 = -13.8;
+
 /// The distribution of residual vectors: `p(r) ~ (1 + |r|^2 / (nu v))^(-(nu + 2) / 2)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StudentT {
@@ -34,6 +37,19 @@ impl StudentT {
         }
     }
 
+    /// `ln p = -ln(2 pi v) - (nu + 2)/2 ln(1 + |r|^2/(nu v))` of a residual whose squared length is
+    /// given, 1/px^2. One beyond the rejection limit comes from anywhere, with a density that no
+    /// parameter changes.
+    pub fn log_density(&self, squared_px2: f64) -> f64 {
+        if self.weight(squared_px2) > 0.0 {
+            -(2.0 * std::f64::consts::PI * self.variance_px2).ln()
+                - (self.freedom + 2.0) / 2.0
+                    * (squared_px2 / (self.freedom * self.variance_px2)).ln_1p()
+        } else {
+            LN_OUTLIER_DENSITY
+        }
+    }
+
     /// The distribution, of those tried, that makes the residuals most likely. `squared_px2` are
     /// the squared lengths of residual vectors; at least `floor_px2` per axis is assumed, so that
     /// noise-free data have a scale.
@@ -51,7 +67,6 @@ impl StudentT {
                 freedom,
                 variance_px2: robust_start,
             };
-            let mut kept = 0.0;
             for _ in 0..30 {
                 let (mut weighted, mut count) = (0.0, 0.0);
                 for s in squared_px2 {
@@ -61,7 +76,6 @@ impl StudentT {
                         count += 1.0;
                     }
                 }
-                kept = count;
                 if count == 0.0 {
                     break;
                 }
@@ -72,21 +86,7 @@ impl StudentT {
                     break;
                 }
             }
-            // Log likelihood per kept residual; all candidates normalize alike:
-            // ln p = -ln(2 pi v) - (nu + 2)/2 ln(1 + |r|^2/(nu v)).
-            let log_likelihood = squared_px2
-                .iter()
-                .filter(|s| fit.weight(**s) > 0.0)
-                .map(|s| {
-                    -fit.variance_px2.ln()
-                        - (freedom + 2.0) / 2.0 * (s / (freedom * fit.variance_px2)).ln_1p()
-                })
-                .sum::<f64>()
-                // A rejected residual counts as one at the limit, so that rejecting is never free.
-                - (squared_px2.len() as f64 - kept)
-                    * (fit.variance_px2.ln()
-                        + (freedom + 2.0) / 2.0
-                            * (REJECT_BEYOND_SIGMA * REJECT_BEYOND_SIGMA / freedom).ln_1p());
+            let log_likelihood: f64 = squared_px2.iter().map(|s| fit.log_density(*s)).sum();
             if best.is_none_or(|(likelihood, _)| log_likelihood > likelihood) {
                 best = Some((log_likelihood, fit));
             }

@@ -67,7 +67,10 @@ pub fn best_placement(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Rigi
         .map(|(f, t)| (t - to_mean) * (f - from_mean).transpose())
         .sum();
     let rotation = so3::nearest_rotation(&covariance)?;
-    Some(RigidTransform::new(rotation, to_mean - rotation * from_mean))
+    Some(RigidTransform::new(
+        rotation,
+        to_mean - rotation * from_mean,
+    ))
 }
 
 #[cfg(test)]
@@ -76,7 +79,11 @@ mod tests {
 
     #[test]
     fn a_scaled_board_shows_its_scale_and_a_moved_one_nothing() {
-        let board = BoardSpec { rows: 4, cols: 5, square_mm: 10.0 };
+        let board = BoardSpec {
+            rows: 4,
+            cols: 5,
+            square_mm: 10.0,
+        };
         let moved = RigidTransform::new(
             so3::exp(&Vector3::new(0.3, -1.0, 0.2)),
             Vector3::new(5.0, -7.0, 300.0),
@@ -85,18 +92,35 @@ mod tests {
             corners: (0..20)
                 .map(|k| {
                     let (row, col) = (k / 5, k % 5);
-                    (row, col, moved.point(&(board.corner_in_board(row, col) * scale)))
+                    (
+                        row,
+                        col,
+                        moved.point(&(board.corner_in_board(row, col) * scale)),
+                    )
                 })
                 .collect(),
         };
         let exact = measure(1.0);
         assert_eq!(exact.neighbor_errors(&board).len(), 4 * 4 + 3 * 5);
-        assert!(exact.neighbor_errors(&board).iter().all(|e| e.abs() < 1e-12));
+        assert!(
+            exact
+                .neighbor_errors(&board)
+                .iter()
+                .all(|e| e.abs() < 1e-12)
+        );
         assert!(exact.rigid_errors_mm(&board).iter().all(|e| *e < 1e-12));
         let scaled = measure(1.01);
-        assert!(scaled.neighbor_errors(&board).iter().all(|e| (e - 0.01).abs() < 1e-12));
+        assert!(
+            scaled
+                .neighbor_errors(&board)
+                .iter()
+                .all(|e| (e - 0.01).abs() < 1e-12)
+        );
         // The corner farthest from the middle is 25 mm away: 1 % of it.
-        let worst = scaled.rigid_errors_mm(&board).into_iter().fold(0.0, f64::max);
+        let worst = scaled
+            .rigid_errors_mm(&board)
+            .into_iter()
+            .fold(0.0, f64::max);
         assert!((worst - 0.25).abs() < 1e-3);
     }
 }

@@ -108,6 +108,37 @@ impl Spline {
         }
     }
 
+    /// The same map on another grid: exact for what both grids can hold of cubics, a good start
+    /// for the rest (quasi-interpolation, `c_k = (8 f_k - f_{k-1} - f_{k+1}) / 6` along each axis,
+    /// f at the knots).
+    pub fn resampled(&self, grid: SplineGrid) -> Self {
+        let (nu, nv) = (grid.knots_u(), grid.knots_v());
+        let site = |k: isize, cells: usize, extent: u32| {
+            (k as f64 - 1.0) * f64::from(extent) / cells as f64 - 0.5
+        };
+        let mut samples = vec![Vector2::zeros(); (nu + 2) * (nv + 2)];
+        for j in 0..nv + 2 {
+            for i in 0..nu + 2 {
+                let u = site(i as isize - 1, grid.cells_u, grid.sensor.width);
+                let v = site(j as isize - 1, grid.cells_v, grid.sensor.height);
+                // Off the sensor the nearest point on it stands in: a cubic's continuation grows.
+                let last_u = f64::from(grid.sensor.width) - 0.5;
+                let last_v = f64::from(grid.sensor.height) - 0.5;
+                let pixel = PixelPoint::new(u.clamp(-0.5, last_u), v.clamp(-0.5, last_v));
+                samples[j * (nu + 2) + i] = self.evaluate(pixel).0;
+            }
+        }
+        let at = |i: usize, j: usize| samples[j * (nu + 2) + i];
+        let along_u = |i: usize, j: usize| (at(i + 1, j) * 8.0 - at(i, j) - at(i + 2, j)) / 6.0;
+        let coefficients = (0..nu * nv)
+            .map(|k| {
+                let (i, j) = (k % nu, k / nu);
+                (along_u(i, j + 1) * 8.0 - along_u(i, j) - along_u(i, j + 2)) / 6.0
+            })
+            .collect();
+        Self { grid, coefficients }
+    }
+
     /// Value, and derivative by (u, v) per px (columns).
     pub fn evaluate(&self, pixel: PixelPoint) -> (Vector2<f64>, Matrix2<f64>) {
         self.weighted(&self.grid.weights_u(pixel.u), &self.grid.weights_v(pixel.v))

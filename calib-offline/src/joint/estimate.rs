@@ -1,10 +1,10 @@
-//! The estimate from start to end: rounds of re-weighting, adjustment and evidence.
+//! The estimate from start to end.
 
-use super::evidence::{Smoothness, SmoothnessFound, effective_share, neighbor_correlation};
-use crate::adjust::levenberg::{self, Settings, StopReason};
-use crate::adjust::normal_equations::{self, NormalEquations};
-use crate::adjust::observations::ViewBasis;
-use crate::adjust::robust::{StudentT, reweight};
+use super::choice::{self, Candidate, Choice};
+use super::evidence::{Smoothness, SmoothnessFound};
+use super::fit::Fit;
+use crate::adjust::levenberg::StopReason;
+use crate::adjust::robust::StudentT;
 use crate::adjust::{CameraModel, Model, Observations};
 use crate::board::BoardShape;
 use crate::field::polynomial::term_count;
@@ -14,12 +14,11 @@ use nalgebra::Vector2;
 
 /// Total degree of the field's polynomial (METHOD 9A).
 const DEGREE: usize = 7;
-/// Standard deviation of each coefficient of the board's shape before anything is seen, mm.
-const BOARD_SHAPE_SD_MM: f64 = 0.1;
-/// Rounds with structured directions only, with all directions, and with correlated corners.
-const ROUNDS: [usize; 3] = [3, 6, 5];
-/// Linearizations within a round.
-const STEPS_PER_ROUND: usize = 3;
+/// Adjustments with structured directions only, of so many steps each.
+const STRUCTURED_ROUNDS: usize = 3;
+const STRUCTURED_STEPS: usize = 3;
+/// Steps of the last adjustment, at most; it needs three or four.
+const LAST_STEPS: usize = 30;
 
 /// The result of the joint estimate.
 #[derive(Debug, Clone)]
@@ -36,8 +35,10 @@ pub struct Estimate {
     pub noise: StudentT,
     /// Correlation of neighboring corners' residuals.
     pub neighbor_correlation: f64,
-    /// Smoothness per camera and degree.
+    /// Smoothness per camera and family.
     pub smoothness: Vec<SmoothnessFound>,
+    /// What the evidence decided.
+    pub choices: Vec<Choice>,
     /// Objective after each accepted step of the last adjustment.
     pub costs: Vec<f64>,
     /// Why the last adjustment ended.
@@ -58,21 +59,6 @@ pub enum EstimateError {
     },
 }
 
-/// The estimate in progress.
-struct State {
-    model: Model,
-    observations: Observations,
-    bases: Vec<ViewBasis>,
-    smoothness: Smoothness,
-    /// Share of corners that count as independent.
-    share: f64,
-    /// Number of parameters that the data determine, for the noise's degrees of freedom.
-    effective_parameters: f64,
-    noise: StudentT,
-    costs: Vec<f64>,
-    stop: StopReason,
-}
-
 /// Estimates everything from a start.
 ///
 /// # Errors
@@ -86,6 +72,32 @@ pub fn estimate(observations: &Observations, start: &RigStart) -> Result<Estimat
         .map(|(pose, _)| *pose)
         .collect();
     let observations = observations.with_poses(|pose| placed.contains(&pose));
+    let model = starting_model(start);
+
+    // What every lens may use, then where its center of distortion is.
+    let smoothness = Smoothness::structured_only(&model);
+    let mut fit = Fit::new(model, smoothness, &observations);
+    for _ in 0..STRUCTURED_ROUNDS {
+        fit.adjust(&observations, STRUCTURED_STEPS);
+    }
+    let mut fit = fit.changed(&observations, free_center_of_distortion);
+    fit.smoothness = Smoothness::new(&fit.model);
+
+    // What the evidence asks for beyond, first as if corners were independent: only a field that
+    // fits shows how much they are not.
+    let settled = Candidate::settle(fit, &observations)?;
+    let (mut best, mut choices) = choice::choose(settled, &observations)?;
+    let correlation = best.fit.measure_correlation(&observations);
+    if best.fit.share < 1.0 {
+        best = Candidate::settle(best.fit, &observations)?;
+        choice::simplify(&mut best, &mut choices, &observations)?;
+    }
+    let mut fit = best.fit;
+    fit.adjust(&observations, LAST_STEPS);
+    Ok(finish(fit, observations, correlation, choices))
+}
+
+fn starting_model(start: &RigStart) -> Model {
     let cameras = start
         .fields
         .iter()
@@ -105,155 +117,54 @@ pub fn estimate(observations: &Observations, start: &RigStart) -> Result<Estimat
             }
         })
         .collect();
-    let model = Model {
+    Model {
         cameras,
         rig_from_board: start.rig_from_board.iter().flatten().copied().collect(),
         board_shape: BoardShape::flat_of_degree_two(),
-    };
-    let bases = model.view_bases(&observations);
-    let mut state = State {
-        smoothness: Smoothness::structured_only(&model),
-        model,
-        observations,
-        bases,
-        share: 1.0,
-        effective_parameters: 0.0,
-        noise: StudentT {
-            freedom: 4.0,
-            variance_px2: 1.0,
-        },
-        costs: Vec::new(),
-        stop: StopReason::IterationLimit,
-    };
-    for _ in 0..ROUNDS[0] {
-        state.round(STEPS_PER_ROUND);
     }
-    state.free_center_of_distortion();
-    state.smoothness = Smoothness::new(&state.model);
-    for _ in 0..ROUNDS[1] {
-        state.round(STEPS_PER_ROUND);
-        state.update_evidence()?;
-    }
-    let correlation = state.correlation();
-    state.share = effective_share(correlation);
-    for _ in 0..ROUNDS[2] {
-        state.round(STEPS_PER_ROUND);
-        state.update_evidence()?;
-    }
-    state.round(30);
-    Ok(state.finish(correlation))
 }
 
-impl State {
-    fn board_prior() -> f64 {
-        1.0 / (BOARD_SHAPE_SD_MM * BOARD_SHAPE_SD_MM)
+/// Lets the center of the radial mapping move freely, now that the mapping is known.
+fn free_center_of_distortion(model: &mut Model) {
+    for camera in &mut model.cameras {
+        let field = &camera.field;
+        let profile = RadialProfile::of(field.sensor, field.base, &field.direction.polynomial);
+        camera.basis = StructuredBasis::new(field.sensor, DEGREE, Some(&profile));
     }
+}
 
-    fn weights(&mut self) -> normal_equations::Weights {
-        let residuals = normal_equations::residuals(&self.model, &self.observations, &self.bases);
-        let numbers = 2.0 * self.observations.corner_count() as f64;
-        // The residuals of a fit are smaller than the noise by the parameters that it used up.
-        let freedom = (1.0 - self.effective_parameters / numbers).max(0.1);
-        let (noise, weights) = reweight(&residuals, &self.observations, self.share * freedom);
-        self.noise = StudentT {
-            variance_px2: noise.variance_px2 / freedom,
-            ..noise
-        };
-        weights
-    }
-
-    /// New weights, then an adjustment with them.
-    fn round(&mut self, max_iterations: usize) {
-        let weights = self.weights();
-        let priors = self.smoothness.priors(&self.model, Self::board_prior());
-        let outcome = levenberg::minimize(
-            self.model.clone(),
-            &self.observations,
-            &self.bases,
-            &weights,
-            &priors,
-            Settings {
-                max_iterations,
-                ..Settings::default()
-            },
-        );
-        self.model = outcome.model;
-        self.costs = outcome.costs;
-        self.stop = outcome.stop;
-    }
-
-    /// Lets the center of the radial mapping move freely, now that the mapping is known.
-    fn free_center_of_distortion(&mut self) {
-        for camera in &mut self.model.cameras {
-            let field = &camera.field;
-            let profile = RadialProfile::of(field.sensor, field.base, &field.direction.polynomial);
-            camera.basis = StructuredBasis::new(field.sensor, DEGREE, Some(&profile));
-        }
-    }
-
-    fn update_evidence(&mut self) -> Result<(), EstimateError> {
-        let layout = self.model.layout();
-        let weights = self.weights();
-        let priors = self.smoothness.priors(&self.model, Self::board_prior());
-        let reduced = NormalEquations::assemble(
-            &self.model,
-            &layout,
-            &self.observations,
-            &self.bases,
-            &weights,
-            &priors,
-        )
-        .reduce(0.0)
-        .ok_or(EstimateError::Singular {
-            free: layout.global_len,
-            corner_count: self.observations.corner_count(),
-        })?;
-        let smooth = self
-            .smoothness
-            .update(&self.model, &layout, &reduced.global_covariance());
-        let penalized: usize = priors
-            .cameras
-            .iter()
-            .map(|c| c.direction.iter().filter(|w| **w > 0.0).count())
-            .sum();
-        self.effective_parameters = (layout.global_len - penalized) as f64
-            + smooth
-            + 6.0 * self.observations.poses.len() as f64;
-        Ok(())
-    }
-
-    fn correlation(&self) -> f64 {
-        let residuals = normal_equations::residuals(&self.model, &self.observations, &self.bases);
-        neighbor_correlation(&residuals, &self.observations, &self.noise).unwrap_or(0.0)
-    }
-
-    fn finish(self, neighbor_correlation: f64) -> Estimate {
-        let residuals = normal_equations::residuals(&self.model, &self.observations, &self.bases);
-        let robust_weights = residuals
-            .iter()
-            .zip(&self.observations.views)
-            .map(|(residuals, view)| {
-                residuals
-                    .iter()
-                    .zip(&view.corners)
-                    .map(|(residual, corner)| {
-                        let squared = residual.map(|r| r.norm_squared() * corner.relative_weight);
-                        // The largest weight of the distribution is (nu + 2) / nu, at zero.
-                        squared.map_or(0.0, |s| self.noise.weight(s) / self.noise.weight(0.0))
-                    })
-                    .collect()
-            })
-            .collect();
-        Estimate {
-            smoothness: self.smoothness.found(),
-            model: self.model,
-            observations: self.observations,
-            residuals,
-            robust_weights,
-            noise: self.noise,
-            neighbor_correlation,
-            costs: self.costs,
-            stop: self.stop,
-        }
+fn finish(
+    fit: Fit,
+    observations: Observations,
+    neighbor_correlation: f64,
+    choices: Vec<Choice>,
+) -> Estimate {
+    let residuals = fit.residuals().to_vec();
+    let robust_weights = residuals
+        .iter()
+        .zip(&observations.views)
+        .map(|(residuals, view)| {
+            residuals
+                .iter()
+                .zip(&view.corners)
+                .map(|(residual, corner)| {
+                    let squared = residual.map(|r| r.norm_squared() * corner.relative_weight);
+                    // The largest weight of the distribution is (nu + 2) / nu, at zero.
+                    squared.map_or(0.0, |s| fit.noise.weight(s) / fit.noise.weight(0.0))
+                })
+                .collect()
+        })
+        .collect();
+    Estimate {
+        smoothness: fit.smoothness.found(&fit.model),
+        model: fit.model,
+        observations,
+        residuals,
+        robust_weights,
+        noise: fit.noise,
+        neighbor_correlation,
+        choices,
+        costs: fit.costs,
+        stop: fit.stop,
     }
 }

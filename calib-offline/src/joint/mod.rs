@@ -2,7 +2,11 @@
 //! adjustment, with smoothness weights and noise found from the data. METHOD sections 2 and 9A.
 
 pub mod calibrated;
+pub mod choice;
+pub mod correlation;
 pub mod estimate;
 pub mod evidence;
+pub mod fit;
 
+pub use choice::Choice;
 pub use estimate::{Estimate, EstimateError, estimate};

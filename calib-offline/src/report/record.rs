@@ -1,8 +1,8 @@
 //! `calibration.json`: everything a calibration found, versioned, enough to draw every figure again.
 
 pub use crate::board::BoardShape;
-pub use crate::evaluate::verdict::{Grade, Verdict};
 use crate::board::BoardSpec;
+pub use crate::evaluate::verdict::{Grade, Verdict};
 use crate::field::Rig;
 use crate::geometry::{PixelPoint, RigidTransform};
 use nalgebra::Vector2;

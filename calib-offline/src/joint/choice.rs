@@ -1,0 +1,174 @@
+//! What the model is made of, chosen by the evidence: spline spacing, and per camera central or
+//! not. Every alternative that was tried is reported with its evidence.
+
+use super::estimate::EstimateError;
+use super::fit::Fit;
+use crate::adjust::{Model, Observations};
+use crate::field::SmoothMap;
+use crate::field::spline::{Spline, SplineGrid};
+
+/// Spacings tried, in cells along the sensor's longer side, coarse to fine: 112, 56, 40 and 28 px
+/// on 1280 px. The search stops when the evidence falls.
+const CELLS: [f64; 4] = [11.5, 23.0, 32.0, 46.0];
+/// Degree of the offset's polynomial: a cubic follows windows and flat ports, the higher degrees,
+/// held back by weights of their own, curved ports and mirrors.
+const OFFSET_DEGREE: usize = 7;
+/// Rounds after a change of the model, at most.
+const ROUNDS: usize = 8;
+/// A round that changes twice the log evidence by less settles the fit.
+const SETTLED: f64 = 0.5;
+/// Twice the log evidence that a more flexible model must gain: "positive" on the scale of Kass
+/// and Raftery (1995). Ties go to the simpler model.
+const NEEDED_GAIN: f64 = 4.0;
+
+/// An alternative that was tried.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choice {
+    /// In words.
+    pub what: String,
+    /// Twice its log evidence minus that of the model that was best until then.
+    pub gain: f64,
+    /// Whether it was taken.
+    pub taken: bool,
+}
+
+/// The fit with its evidence.
+pub struct Candidate {
+    /// The fit.
+    pub fit: Fit,
+    /// Twice the log evidence, up to a constant.
+    pub evidence: f64,
+}
+
+impl Candidate {
+    /// Takes a fit through rounds until its evidence settles.
+    ///
+    /// # Errors
+    /// [`EstimateError::Singular`].
+    pub fn settle(mut fit: Fit, observations: &Observations) -> Result<Self, EstimateError> {
+        let mut evidence = f64::NEG_INFINITY;
+        for _ in 0..ROUNDS {
+            let now = fit.round(observations)?;
+            let settled = (now - evidence).abs() < SETTLED;
+            evidence = now;
+            if settled {
+                break;
+            }
+        }
+        Ok(Self { fit, evidence })
+    }
+}
+
+/// Takes what the evidence asks for, starting from a settled fit without spline and offset.
+///
+/// # Errors
+/// [`EstimateError::Singular`].
+pub fn choose(
+    start: Candidate,
+    observations: &Observations,
+) -> Result<(Candidate, Vec<Choice>), EstimateError> {
+    let mut best = start;
+    let mut tried = Vec::new();
+    take_if_better(
+        &mut best,
+        &mut tried,
+        "offsets of all cameras".to_string(),
+        NEEDED_GAIN,
+        observations,
+        add_offsets,
+    )?;
+    for cells in CELLS {
+        let taken = take_if_better(
+            &mut best,
+            &mut tried,
+            format!("spline of {cells:.0} cells along the longer side"),
+            NEEDED_GAIN,
+            observations,
+            |model| set_spline(model, cells),
+        )?;
+        if !taken {
+            break;
+        }
+    }
+    simplify(&mut best, &mut tried, observations)?;
+    Ok((best, tried))
+}
+
+/// Drops what the evidence no longer asks for: offsets camera by camera, then splines.
+///
+/// # Errors
+/// [`EstimateError::Singular`].
+pub fn simplify(
+    best: &mut Candidate,
+    tried: &mut Vec<Choice>,
+    observations: &Observations,
+) -> Result<(), EstimateError> {
+    for camera_idx in 0..best.fit.model.cameras.len() {
+        if best.fit.model.cameras[camera_idx].field.offset.is_some() {
+            take_if_better(
+                best,
+                tried,
+                format!("camera {camera_idx} central"),
+                -NEEDED_GAIN,
+                observations,
+                |model| model.cameras[camera_idx].field.offset = None,
+            )?;
+        }
+    }
+    if best
+        .fit
+        .model
+        .cameras
+        .iter()
+        .any(|c| c.knot_order().is_some())
+    {
+        take_if_better(
+            best,
+            tried,
+            "no spline".to_string(),
+            -NEEDED_GAIN,
+            observations,
+            |model| {
+                for camera in &mut model.cameras {
+                    camera.field.direction.spline = None;
+                }
+            },
+        )?;
+    }
+    Ok(())
+}
+
+fn take_if_better(
+    best: &mut Candidate,
+    tried: &mut Vec<Choice>,
+    what: String,
+    needed: f64,
+    observations: &Observations,
+    change: impl FnOnce(&mut Model),
+) -> Result<bool, EstimateError> {
+    let candidate = Candidate::settle(best.fit.changed(observations, change), observations)?;
+    let gain = candidate.evidence - best.evidence;
+    let taken = gain > needed;
+    tried.push(Choice { what, gain, taken });
+    if taken {
+        *best = candidate;
+    }
+    Ok(taken)
+}
+
+fn add_offsets(model: &mut Model) {
+    for camera in &mut model.cameras {
+        camera.field.offset = Some(SmoothMap::zero(OFFSET_DEGREE));
+    }
+}
+
+fn set_spline(model: &mut Model, cells: f64) {
+    for camera in &mut model.cameras {
+        let sensor = camera.field.sensor;
+        let longer_px = f64::from(sensor.width.max(sensor.height));
+        let grid = SplineGrid::with_spacing(sensor, longer_px / cells);
+        let spline = camera.field.direction.spline.take();
+        camera.field.direction.spline =
+            Some(spline.map_or_else(|| Spline::zero(grid), |old| old.resampled(grid)));
+    }
+}

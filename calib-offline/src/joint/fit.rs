@@ -1,0 +1,184 @@
+//! A fit in progress: a model, its smoothness weights and its noise, taken forward in rounds.
+
+use super::correlation::{effective_share, neighbor_correlation};
+use super::estimate::EstimateError;
+use super::evidence::Smoothness;
+use crate::adjust::levenberg::{self, Settings, StopReason};
+use crate::adjust::normal_equations::{self, NormalEquations, Priors, Reduced, Weights};
+use crate::adjust::observations::ViewBasis;
+use crate::adjust::robust::{StudentT, reweight};
+use crate::adjust::{Model, Observations};
+use nalgebra::Vector2;
+
+/// Standard deviation of each coefficient of the board's shape before anything is seen, mm.
+const BOARD_SHAPE_SD_MM: f64 = 0.1;
+
+/// A model on its way to the best one.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// Where it is.
+    pub model: Model,
+    /// Its smoothness weights.
+    pub smoothness: Smoothness,
+    /// Distribution of the residuals.
+    pub noise: StudentT,
+    /// Share of corners that count as independent.
+    pub share: f64,
+    /// Objective after each accepted step of the last adjustment.
+    pub costs: Vec<f64>,
+    /// Why the last adjustment ended.
+    pub stop: StopReason,
+    /// Number of parameters that the data determine.
+    effective_parameters: f64,
+    bases: Vec<ViewBasis>,
+    residuals: Vec<Vec<Option<Vector2<f64>>>>,
+}
+
+impl Fit {
+    /// A fit that starts at a model, with the smoothness given.
+    pub fn new(model: Model, smoothness: Smoothness, observations: &Observations) -> Self {
+        let bases = model.view_bases(observations);
+        let residuals = normal_equations::residuals(&model, observations, &bases);
+        Self {
+            model,
+            smoothness,
+            noise: StudentT {
+                freedom: 4.0,
+                variance_px2: 1.0,
+            },
+            share: 1.0,
+            costs: Vec::new(),
+            stop: StopReason::IterationLimit,
+            effective_parameters: 0.0,
+            bases,
+            residuals,
+        }
+    }
+
+    /// The same fit of a changed model: what the model gained starts from its start.
+    pub fn changed(&self, observations: &Observations, change: impl FnOnce(&mut Model)) -> Self {
+        let mut next = self.clone();
+        change(&mut next.model);
+        next.smoothness.cover(&next.model);
+        next.bases = next.model.view_bases(observations);
+        next.residuals = normal_equations::residuals(&next.model, observations, &next.bases);
+        next
+    }
+
+    /// Observed minus predicted, px, per view and corner.
+    pub fn residuals(&self) -> &[Vec<Option<Vector2<f64>>>] {
+        &self.residuals
+    }
+
+    /// Weights from the residuals as they are, and the noise that they show.
+    fn reweight(&mut self, observations: &Observations) -> Weights {
+        let numbers = 2.0 * observations.corner_count() as f64;
+        // The residuals of a fit are smaller than the noise by the parameters that it used up.
+        let freedom = (1.0 - self.effective_parameters / numbers).max(0.1);
+        let (noise, weights) = reweight(&self.residuals, observations, self.share * freedom);
+        self.noise = StudentT {
+            variance_px2: noise.variance_px2 / freedom,
+            ..noise
+        };
+        weights
+    }
+
+    fn priors(&self) -> Priors {
+        self.smoothness
+            .priors(&self.model, 1.0 / (BOARD_SHAPE_SD_MM * BOARD_SHAPE_SD_MM))
+    }
+
+    /// New weights, then an adjustment with them.
+    pub fn adjust(&mut self, observations: &Observations, max_iterations: usize) {
+        let weights = self.reweight(observations);
+        let priors = self.priors();
+        let outcome = levenberg::minimize(
+            self.model.clone(),
+            observations,
+            &self.bases,
+            &weights,
+            &priors,
+            Settings {
+                max_iterations,
+                ..Settings::default()
+            },
+        );
+        self.model = outcome.model;
+        self.costs = outcome.costs;
+        self.stop = outcome.stop;
+        self.residuals = normal_equations::residuals(&self.model, observations, &self.bases);
+    }
+
+    /// One round: weights, one Gauss-Newton step, and new smoothness weights from the same
+    /// equations. Returns twice the log evidence where the round began.
+    ///
+    /// # Errors
+    /// [`EstimateError::Singular`] if the data leave a parameter open.
+    pub fn round(&mut self, observations: &Observations) -> Result<f64, EstimateError> {
+        let weights = self.reweight(observations);
+        let priors = self.priors();
+        let layout = self.model.layout();
+        let equations = NormalEquations::assemble(
+            &self.model,
+            &layout,
+            observations,
+            &self.bases,
+            &weights,
+            &priors,
+        );
+        let reduced = equations.reduce(0.0).ok_or(EstimateError::Singular {
+            free: layout.global_len,
+            corner_count: observations.corner_count(),
+        })?;
+        let evidence = self.ln_evidence_twice(&reduced, &priors);
+        let stepped = self.model.stepped(&layout, &equations.step(&reduced));
+        let cost = |model: &Model| {
+            normal_equations::cost(model, observations, &self.bases, &weights, &priors)
+        };
+        if cost(&stepped) < cost(&self.model) {
+            self.model = stepped;
+            self.residuals = normal_equations::residuals(&self.model, observations, &self.bases);
+        } else {
+            self.adjust(observations, 2);
+        }
+        self.update_smoothness(&layout, &priors, &reduced, observations);
+        Ok(evidence)
+    }
+
+    fn update_smoothness(
+        &mut self,
+        layout: &crate::adjust::model::Layout,
+        priors: &Priors,
+        reduced: &Reduced,
+        observations: &Observations,
+    ) {
+        self.smoothness.update(&self.model, layout, priors, reduced);
+        let (effective, held) = self.smoothness.effective(&self.model);
+        let splines: usize = self
+            .model
+            .cameras
+            .iter()
+            .map(|camera| camera.spline_amounts().len())
+            .sum();
+        let free = layout.global_len + splines - held;
+        self.effective_parameters = free as f64 + effective + 6.0 * observations.poses.len() as f64;
+    }
+
+    /// Log likelihood of the residuals under the distribution found.
+    pub fn log_likelihood(&self) -> f64 {
+        let squared = self
+            .residuals
+            .iter()
+            .flatten()
+            .map(|residual| residual.map_or(f64::INFINITY, |r| r.norm_squared()));
+        squared.map(|s| self.noise.log_density(s)).sum()
+    }
+
+    /// Measures how alike neighboring corners err and lets them count accordingly from now on.
+    pub fn measure_correlation(&mut self, observations: &Observations) -> f64 {
+        let correlation =
+            neighbor_correlation(&self.residuals, observations, &self.noise).unwrap_or(0.0);
+        self.share = effective_share(correlation);
+        correlation
+    }
+}
