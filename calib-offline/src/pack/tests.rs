@@ -139,3 +139,38 @@ fn figures() {
         }
     }
 }
+
+#[test]
+fn ablation() {
+    for f in [3000.0, 6000.0, 12000.0] {
+        for k in 0..6 {
+            let (name, pose) = (
+                "k",
+                RigidTransform::new(
+                    so3::exp(&Vector3::new(
+                        0.7 * f64::from(k),
+                        0.5,
+                        (f64::from(k) * 1.3).sin(),
+                    )),
+                    Vector3::new(100.0, 20.0, -600.0),
+                ),
+            );
+            let cam = camera("big", distorted_field(SensorSize::new(6000, 4000), f), pose);
+            let grid = grid::fit(&cam, [41, 27]).unwrap();
+            let parts = encode::BlobParts {
+                identity: [0; 16],
+                frame: "",
+                max_error_px: 1.0,
+                working_distance_mm: 600.0,
+                self_tests: vec![],
+            };
+            let bytes =
+                AlignedBytes::from(parts.encode_cameras(&[(&cam, &grid)]).unwrap().as_slice());
+            let p = proof::prove(&cam, &RayBlob::open(&bytes).unwrap(), 0, 600.0, 7);
+            eprintln!(
+                "{name} {f} {k} {:.2e} {:.2e}",
+                p.worst_error_px, p.rms_error_px
+            );
+        }
+    }
+}
