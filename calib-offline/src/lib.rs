@@ -3,13 +3,13 @@
 pub mod adjust;
 pub mod atomic_file;
 pub mod board;
-pub mod cli;
 pub mod dataset;
 pub mod evaluate;
 pub mod field;
 pub mod geometry;
 pub mod init;
 pub mod joint;
+pub mod pack;
 pub mod progress;
 pub mod report;
 pub mod simulate;
