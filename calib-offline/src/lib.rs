@@ -5,5 +5,6 @@ pub mod board;
 pub mod dataset;
 pub mod field;
 pub mod geometry;
+pub mod matches;
 pub mod progress;
 pub mod report;
