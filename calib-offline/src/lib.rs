@@ -3,6 +3,7 @@
 pub mod atomic_file;
 pub mod board;
 pub mod dataset;
+pub mod error;
 pub mod field;
 pub mod geometry;
 pub mod matches;
