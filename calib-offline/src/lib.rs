@@ -3,7 +3,9 @@
 pub mod atomic_file;
 pub mod board;
 pub mod dataset;
+pub mod cli;
 pub mod error;
+pub mod evaluate;
 pub mod field;
 pub mod geometry;
 pub mod matches;

@@ -10,7 +10,7 @@ use crate::geometry::{PixelPoint, RigidTransform, SensorSize, so3};
 use nalgebra::{Vector2, Vector3};
 
 const SENSOR: SensorSize = SensorSize::new(1280, 1024);
-const FOCAL_PX: f64 = 1400.0;
+const FOCAL_PX: f64 = 2400.0;
 const SIGMA_PX: f64 = 0.05;
 const POSE_COUNT: usize = 34;
 
@@ -108,6 +108,7 @@ pub fn calibration() -> Calibration {
             corners_used: corners.len() - corners_rejected,
             corners_rejected,
         },
+        stage_axes: crate::evaluate::fit_stage_axes(&poses, |pose| Some(pose / 17)),
         poses,
         corners,
         left_out: left_out(),

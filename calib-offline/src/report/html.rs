@@ -140,7 +140,7 @@ fn share_rejected(facts: &Facts) -> String {
 fn figures(calibration: &Calibration) -> Markup {
     html! {
         (group("Coverage", &coverage::draw(calibration),
-            "Each dot is a corner. Hatched parts of the sensor are not calibrated: a pixel there gets no ray. Good: dots everywhere, to the edges. To enlarge the calibrated area, record poses with the board over the hatched parts."))
+            "Each dot is a corner. Shaded parts of the sensor are not calibrated: a pixel there gets no ray. Good: dots everywhere, to the edges. To enlarge the calibrated area, record poses with the board over the shaded parts."))
         (group("Residual vectors", &residual_vectors::draw(calibration),
             "Each line is what the model did not explain at one corner, colored by its direction. Good: short lines in mixed colors. Bad: neighbors with one color, which is a pattern that noise does not make: a lens the model cannot follow, a bent board, or something that moved between the cameras."))
         (group("Distribution", histogram::draw(calibration).as_slice(),

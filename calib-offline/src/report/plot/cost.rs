@@ -24,7 +24,7 @@ pub fn draw(calibration: &Calibration) -> Option<Figure> {
         (y, ticks(y, 5))
     };
     let axes = Axes {
-        across: [48.0, WIDTH - 10.0],
+        across: [48.0, WIDTH - 18.0],
         down: [10.0, 190.0],
         x: [0.0, (costs.len() - 1) as f64],
         y,

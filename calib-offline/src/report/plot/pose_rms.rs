@@ -7,7 +7,7 @@ use crate::report::Calibration;
 use crate::report::record::PoseRecord;
 
 /// Poses shown; the best are left out.
-const MAX_POSES: usize = 30;
+const MAX_POSES: usize = 20;
 /// Colors of the style sheet for cameras.
 pub(super) const CAMERA_COLORS: usize = 4;
 
@@ -35,7 +35,7 @@ pub fn draw(calibration: &Calibration) -> Option<Figure> {
     let top = 24.0;
     let bottom = top + group * shown as f64;
     let axes = Axes {
-        across: [52.0, WIDTH - 10.0],
+        across: [52.0, WIDTH - 18.0],
         down: [top, bottom],
         x: [0.0, round_up(*worst)],
         y: [0.0, 1.0],

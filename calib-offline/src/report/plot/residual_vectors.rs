@@ -80,7 +80,7 @@ fn draw_camera(
         "not the usual 0.1 px, because these residuals would not fit it"
     };
     let thinned = if every > 1 {
-        format!(" Every {every}th of {count} corners is drawn.")
+        format!(" Drawn is one of every {every} of the {count} corners.")
     } else {
         format!(" {count} corners.")
     };

@@ -75,11 +75,16 @@ fn draw_one(calibration: &Calibration, title: &str, projection: &Matrix2x3<f64>)
         Anchor::Start,
         &format!("{bar_mm} mm"),
     );
+    let axes = match calibration.stage_axes.len() {
+        0 => String::new(),
+        1 => " The dashed line is the stage's axis.".to_owned(),
+        count => format!(" The {count} dashed lines are the stage's axes, one per placement."),
+    };
     Figure {
         title: title.to_owned(),
         svg: svg.finish(&format!("Cameras and boards: {title}")),
         caption: format!(
-            "{} boards (outline of the inner corners; pose {} stands out: it is the rig frame), {} cameras with what they see to a quarter of the way.",
+            "{} boards (outline of the inner corners; pose {} stands out: it is the rig frame), {} cameras with what they see to a quarter of the way.{axes}",
             calibration.poses.len(),
             calibration.rig.datum_pose,
             calibration.rig.cameras.len()
@@ -113,6 +118,16 @@ fn shapes(calibration: &Calibration) -> Vec<Shape> {
         .iter()
         .find(|pose| pose.pose == calibration.rig.datum_pose);
     shapes.extend(datum.map(|pose| board(&pose.rig_from_board, "board datum")));
+    // Drawn a little longer than a board is tall.
+    let half_mm = 0.7 * width_mm.max(height_mm);
+    shapes.extend(calibration.stage_axes.iter().map(|axis| Shape {
+        class: "stage".to_owned(),
+        points: vec![
+            axis.point_mm - axis.direction * half_mm,
+            axis.point_mm + axis.direction * half_mm,
+        ],
+        label: None,
+    }));
     let center = calibration.board.center_in_board();
     for camera in &calibration.rig.cameras {
         let origin = camera.rig_from_camera.translation_mm;
