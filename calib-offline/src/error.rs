@@ -3,6 +3,7 @@
 use crate::atomic_file::WriteError;
 use crate::dataset::{CornersError, ManifestError, SufficiencyError};
 use crate::matches::MatchesError;
+use crate::pack::PackError;
 use crate::report::store::CalibrationError;
 use std::path::PathBuf;
 
@@ -28,6 +29,12 @@ pub enum Error {
     /// Matches that were read.
     #[error("the matches cannot be used")]
     Matches(#[from] MatchesError),
+    /// A rig that was to be packed.
+    #[error("the calibration cannot be packed")]
+    Pack(#[from] PackError),
+    /// A result that JSON cannot say.
+    #[error("the result cannot be written as JSON")]
+    Json(#[from] serde_json::Error),
     /// A result that was to be written.
     #[error("the result cannot be written")]
     Write(#[from] WriteError),
@@ -157,12 +164,14 @@ impl Error {
     /// The process's exit code: 3 where the data cannot determine the answer, else 2.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Sufficiency(_) => 3,
+            Self::Sufficiency(_) | Self::Pack(PackError::NothingCalibrated { .. }) => 3,
             Self::Manifest(_)
             | Self::Corners(_)
             | Self::Calibration(_)
             | Self::Blob(_)
             | Self::Matches(_)
+            | Self::Pack(_)
+            | Self::Json(_)
             | Self::Write(_)
             | Self::Usage(_) => 2,
         }
@@ -177,8 +186,26 @@ impl Error {
             Self::Calibration(error) => error.remedy(),
             Self::Blob(error) => error.remedy(),
             Self::Matches(error) => error.remedy(),
+            Self::Pack(error) => pack_remedy(error),
+            Self::Json(_) => None,
             Self::Write(error) => error.remedy(),
             Self::Usage(error) => error.remedy(),
         }
     }
+}
+
+fn pack_remedy(error: &PackError) -> Option<String> {
+    Some(match error {
+        PackError::BadSetting { .. } => "give a bound in pixels such as 0.001".to_owned(),
+        PackError::BoundNotReached { best_px, .. } => {
+            format!(
+                "ask for more: --max-error-px {:.1e} or above",
+                1.1 * best_px
+            )
+        }
+        PackError::NothingCalibrated { .. } => {
+            "calibrate with corners over more of the sensor".to_owned()
+        }
+        _ => return None,
+    })
 }

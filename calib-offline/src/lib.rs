@@ -2,12 +2,14 @@
 
 pub mod atomic_file;
 pub mod board;
-pub mod dataset;
 pub mod cli;
+pub mod dataset;
 pub mod error;
 pub mod evaluate;
 pub mod field;
 pub mod geometry;
 pub mod matches;
+pub mod pack;
+pub mod pipeline;
 pub mod progress;
 pub mod report;

@@ -25,7 +25,8 @@ pub struct RayBlob<'a> {
     frame: &'a str,
     written_by: &'a str,
     camera_meta: &'a [u8],
-    self_tests: SelfTests<'a>,
+    self_test_bytes: &'a [u8],
+    self_test_count: u16,
     max_error_px: f32,
     working_distance_mm: f32,
 }
@@ -70,10 +71,8 @@ impl<'a> RayBlob<'a> {
             frame: meta.frame,
             written_by: meta.written_by,
             camera_meta,
-            self_tests: SelfTests {
-                bytes: &[],
-                left: 0,
-            },
+            self_test_bytes: &[],
+            self_test_count: meta.self_test_count,
             max_error_px: meta.max_error_px,
             working_distance_mm: meta.working_distance_mm,
         };
@@ -84,10 +83,7 @@ impl<'a> RayBlob<'a> {
         let self_test_bytes = blob.check_cameras(tables_start)?;
         check_self_tests(self_test_bytes, meta.self_test_count, header.camera_count)?;
         Ok(Self {
-            self_tests: SelfTests {
-                bytes: self_test_bytes,
-                left: meta.self_test_count,
-            },
+            self_test_bytes,
             ..blob
         })
     }
@@ -157,7 +153,10 @@ impl<'a> RayBlob<'a> {
 
     /// Questions whose answers' bits are known.
     pub const fn self_tests(&self) -> SelfTests<'a> {
-        self.self_tests
+        SelfTests {
+            bytes: self.self_test_bytes,
+            left: self.self_test_count,
+        }
     }
 
     /// What the pixel of a camera sees, rig frame.
@@ -276,7 +275,7 @@ impl<'a> RayBlob<'a> {
         if !(same_bits(axis_u, record.axis_u())
             && same_bits(axis_v, record.axis_v())
             && is_rotation(record.rotation())
-            && record.translation_mm().iter().all(is_moderate))
+            && record.translation_mm().into_iter().all(is_moderate))
         {
             return Err(number(Table::Record));
         }
@@ -287,7 +286,7 @@ impl<'a> RayBlob<'a> {
             .get(start / 4..grid_end / 4)
             .filter(|_| record.grid_offset() as usize == start)
             .ok_or(layout(Table::Grid))?;
-        if !grid.iter().all(is_moderate) {
+        if !grid.iter().copied().all(is_moderate) {
             return Err(number(Table::Grid));
         }
 
@@ -403,9 +402,9 @@ fn is_region_on_sensor(meta: &CameraMeta<'_>) -> bool {
         && fits(meta.region_v, meta.region_height, meta.sensor_height)
 }
 
-fn is_moderate(x: &f32) -> bool {
+fn is_moderate(x: f32) -> bool {
     // NaN is in no range.
-    (-MAX_MAGNITUDE..=MAX_MAGNITUDE).contains(x)
+    (-MAX_MAGNITUDE..=MAX_MAGNITUDE).contains(&x)
 }
 
 fn same_bits(a: Axis, b: Axis) -> bool {

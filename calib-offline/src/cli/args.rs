@@ -1,6 +1,6 @@
 //! What can be written on the command line. Each help text starts with an example.
 
-use super::{calibrate, demo, inspect, measure};
+use super::{calibrate, demo, inspect, measure, pack};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::num::NonZeroUsize;
 
@@ -43,6 +43,8 @@ pub enum Verb {
     Inspect(inspect::InspectArgs),
     /// Triangulate matches
     Measure(measure::MeasureArgs),
+    /// Pack a calibration for the device within a proven error
+    Pack(pack::PackArgs),
 }
 
 /// What holds for every verb.

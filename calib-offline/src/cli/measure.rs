@@ -3,7 +3,7 @@
 use super::Outcome;
 use super::output::Console;
 use super::place::check_file;
-use super::rig_file::RigFile;
+use super::rig_file::{RigFile, open};
 use crate::atomic_file::{PendingFile, WriteError};
 use crate::error::{Error, UsageError};
 use crate::matches::source::{BlobSource, PointSource, RigSource};
@@ -80,13 +80,13 @@ pub fn run(args: &MeasureArgs, console: &Console) -> Result<Outcome, Error> {
     let frame = args.frame.as_deref();
     let (kind, summary) = match RigFile::read(&args.rig)? {
         RigFile::Blob(bytes) => {
-            let blob = bytes.open(&args.rig)?;
-            let names = names(&BlobSource::new(&blob, None));
+            let blob = open(&bytes, &args.rig)?;
+            let names = names(BlobSource::new(&blob, None));
             let source = BlobSource::new(&blob, frame);
             ("blob", measure(args, source.as_ref(), names)?)
         }
         RigFile::Calibration(calibration) => {
-            let names = names(&RigSource::new(&calibration.rig, None));
+            let names = names(RigSource::new(&calibration.rig, None));
             let source = RigSource::new(&calibration.rig, frame);
             ("calibration", measure(args, source.as_ref(), names)?)
         }
@@ -103,8 +103,8 @@ pub fn run(args: &MeasureArgs, console: &Console) -> Result<Outcome, Error> {
     Ok(Outcome::Done)
 }
 
-fn names(source: &Option<impl PointSource>) -> Vec<String> {
-    source.as_ref().map(PointSource::cameras).unwrap_or_default()
+fn names(source: Option<impl PointSource>) -> Vec<String> {
+    source.map(|source| source.cameras()).unwrap_or_default()
 }
 
 /// `source` is none where the frame is none of the cameras `known`.
@@ -149,7 +149,10 @@ fn measure<S: PointSource>(
 
 fn in_words(object: &MeasureObject<'_>) -> String {
     let summary = &object.summary;
-    let mut parts = vec![format!("{} of {} matches have a point", summary.ok, summary.matches)];
+    let mut parts = vec![format!(
+        "{} of {} matches have a point",
+        summary.ok, summary.matches
+    )];
     for (count, words) in [
         (summary.outside, "outside the calibrated area"),
         (summary.parallel, "with parallel rays"),
@@ -162,5 +165,9 @@ fn in_words(object: &MeasureObject<'_>) -> String {
     if let Some(gap_mm) = summary.gap_rms_mm {
         parts.push(format!("gap {} mm RMS", short(gap_mm)));
     }
-    format!("{}; written to {}", parts.join(", "), object.output.display())
+    format!(
+        "{}; written to {}",
+        parts.join(", "),
+        object.output.display()
+    )
 }

@@ -10,6 +10,7 @@ mod failure;
 pub mod inspect;
 pub mod measure;
 pub mod output;
+pub mod pack;
 pub mod place;
 pub mod progress;
 mod rig_file;
@@ -57,5 +58,6 @@ fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
         Verb::Demo(args) => demo::run(args, console, &crate::pipeline::calibrate),
         Verb::Inspect(args) => inspect::run(args, console),
         Verb::Measure(args) => measure::run(args, console),
+        Verb::Pack(args) => pack::run(args, console),
     }
 }

@@ -61,9 +61,8 @@ pub fn check_results_folder(folder: &Path, files: &[&str], force: bool) -> Resul
 /// Whether the file is empty or begins so.
 fn begins_with(path: &Path, start: &[u8]) -> bool {
     let mut found = Vec::with_capacity(start.len());
-    let read = File::open(path).and_then(|file| {
-        file.take(start.len() as u64).read_to_end(&mut found)
-    });
+    let read =
+        File::open(path).and_then(|file| file.take(start.len() as u64).read_to_end(&mut found));
     read.is_ok() && (found.is_empty() || found == start)
 }
 
@@ -78,7 +77,12 @@ mod tests {
         let path = folder.path().join("points.csv");
         let check = |force| check_file(&path, b"id,x", &[], force);
         assert!(check(false).is_ok());
-        for (content, may) in [("", true), ("id,x,y\n1", true), ("id,u", false), ("id", false)] {
+        for (content, may) in [
+            ("", true),
+            ("id,x,y\n1", true),
+            ("id,u", false),
+            ("id", false),
+        ] {
             fs::write(&path, content).unwrap();
             assert_eq!(check(false).is_ok(), may, "{content:?}");
             assert!(check(true).is_ok());
@@ -92,7 +96,10 @@ mod tests {
         fs::write(&path, "").unwrap();
         let same = folder.path().join(".").join("m.csv");
         let error = check_file(&path, b"id", &[&same], true).unwrap_err();
-        assert!(matches!(error, Error::Usage(UsageError::OutputIsInput { .. })));
+        assert!(matches!(
+            error,
+            Error::Usage(UsageError::OutputIsInput { .. })
+        ));
     }
 
     #[test]

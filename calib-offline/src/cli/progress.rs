@@ -114,7 +114,10 @@ fn bar(stage: &str, total: usize) -> ProgressBar {
             "{msg} {wide_bar} {pos}/{len} {eta}",
         )
     } else {
-        (ProgressBar::new_spinner(), "{msg} {spinner} {pos} {elapsed}")
+        (
+            ProgressBar::new_spinner(),
+            "{msg} {spinner} {pos} {elapsed}",
+        )
     };
     bar.set_draw_target(ProgressDrawTarget::stderr());
     if let Ok(style) = ProgressStyle::with_template(template) {

@@ -1,9 +1,10 @@
 //! A rig from a file: a blob or a calibration, told apart by how the file begins.
 
 use crate::error::{BlobError, Error, UsageError};
+use crate::pack::AlignedBytes;
 use crate::report::Calibration;
 use ray_runtime::RayBlob;
-use ray_runtime::format::{ALIGNMENT, MAGIC};
+use ray_runtime::format::MAGIC;
 use std::path::Path;
 
 /// What a file of a rig holds.
@@ -31,7 +32,7 @@ impl RigFile {
             source,
         })?;
         if bytes.starts_with(&MAGIC) {
-            return Ok(Self::Blob(AlignedBytes::new(&bytes)));
+            return Ok(Self::Blob(AlignedBytes::from(bytes.as_slice())));
         }
         let first = bytes.iter().find(|b| !b.is_ascii_whitespace());
         if first == Some(&b'{') {
@@ -45,33 +46,13 @@ impl RigFile {
     }
 }
 
-/// Bytes at an address that a blob may be opened at.
-#[derive(Debug)]
-pub(super) struct AlignedBytes {
-    words: Vec<u64>,
-    len: usize,
-}
-
-impl AlignedBytes {
-    fn new(bytes: &[u8]) -> Self {
-        let mut words = vec![0u64; bytes.len().div_ceil(ALIGNMENT)];
-        bytemuck::cast_slice_mut(&mut words)[..bytes.len()].copy_from_slice(bytes);
-        Self {
-            words,
-            len: bytes.len(),
-        }
-    }
-
-    /// Opens the blob; `path` is for messages only.
-    ///
-    /// # Errors
-    /// [`BlobError::Open`].
-    pub fn open(&self, path: &Path) -> Result<RayBlob<'_>, BlobError> {
-        RayBlob::open(&bytemuck::cast_slice(&self.words)[..self.len]).map_err(|source| {
-            BlobError::Open {
-                file: path.to_owned(),
-                source,
-            }
-        })
-    }
+/// Opens a blob; `path` is for messages only.
+///
+/// # Errors
+/// [`BlobError::Open`].
+pub(super) fn open<'a>(bytes: &'a [u8], path: &Path) -> Result<RayBlob<'a>, BlobError> {
+    RayBlob::open(bytes).map_err(|source| BlobError::Open {
+        file: path.to_owned(),
+        source,
+    })
 }

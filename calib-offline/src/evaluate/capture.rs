@@ -154,9 +154,8 @@ fn camera_capture<'a>(
     let pixels = || views.clone().flat_map(|v| &v.corners).map(|c| c.pixel);
     let mut corners_per_ninth = [0; 9];
     for pixel in pixels().filter(|p| sensor.contains(*p)) {
-        let third = |value: f64, extent: u32| {
-            ((3.0 * (value + 0.5) / f64::from(extent)) as usize).min(2)
-        };
+        let third =
+            |value: f64, extent: u32| ((3.0 * (value + 0.5) / f64::from(extent)) as usize).min(2);
         corners_per_ninth[3 * third(pixel.v, sensor.height) + third(pixel.u, sensor.width)] += 1;
     }
     CameraCapture {
@@ -255,14 +254,21 @@ mod tests {
         assert_eq!(capture.warnings, Vec::<String>::new());
         assert_eq!((capture.poses, capture.poses_seen_by_all), (12, 12));
         assert_eq!(capture.cameras[0].corners_per_view, Some([20, 20, 20]));
-        assert_eq!(capture.cameras[0].corners_per_ninth.iter().sum::<usize>(), 240);
+        assert_eq!(
+            capture.cameras[0].corners_per_ninth.iter().sum::<usize>(),
+            240
+        );
     }
 
     #[test]
     fn empty_regions_are_named() {
         let all = warnings(&views(12, [5.0, 5.0, 500.0, 590.0]));
         assert_eq!(all.len(), 1);
-        assert!(all[0].contains("top right, right, bottom right"), "{}", all[0]);
+        assert!(
+            all[0].contains("top right, right, bottom right"),
+            "{}",
+            all[0]
+        );
     }
 
     #[test]
@@ -277,7 +283,11 @@ mod tests {
         for view in &mut views {
             view.corners.retain(|c| c.row < 3 && c.col < 4);
         }
-        assert!(warnings(&views).iter().any(|w| w.contains("3 rows and 4 cols")));
+        assert!(
+            warnings(&views)
+                .iter()
+                .any(|w| w.contains("3 rows and 4 cols"))
+        );
     }
 
     #[test]

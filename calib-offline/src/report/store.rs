@@ -5,6 +5,8 @@ use super::Calibration;
 use super::record::SCHEMA;
 use crate::field::polynomial::{MAX_DEGREE, term_count};
 use crate::field::{CalibratedCamera, SmoothMap};
+use ray_runtime::format::IDENTITY_LEN;
+use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
 /// Why a file is not a calibration that this version reads.
@@ -120,6 +122,15 @@ impl Calibration {
         let mut bytes = serde_json::to_vec(self)?;
         bytes.push(b'\n');
         Ok(bytes)
+    }
+
+    /// What the blob of this calibration carries as its identity: the first bytes of the SHA-256
+    /// of the file's content.
+    pub fn identity(&self) -> [u8; IDENTITY_LEN] {
+        let mut identity = [0; IDENTITY_LEN];
+        let hash = Sha256::digest(self.to_json().unwrap_or_default());
+        identity.copy_from_slice(&hash[..IDENTITY_LEN]);
+        identity
     }
 
     fn contradiction(&self) -> Option<(&'static str, Option<String>)> {

@@ -60,7 +60,10 @@ pub fn draw(calibration: &Calibration) -> Option<Figure> {
         })
         .collect();
     svg.polyline("curve", &curve);
-    axes.draw_x(&mut svg, "residual along u or v, px (upwards: % of the components)");
+    axes.draw_x(
+        &mut svg,
+        "residual along u or v, px (upwards: % of the components)",
+    );
     Some(Figure {
         title: "Histogram of residuals".to_owned(),
         svg: svg.finish("Histogram of residuals with the Gaussian of the estimated noise"),
