@@ -39,6 +39,19 @@ pub enum WriteError {
     },
 }
 
+impl WriteError {
+    /// What to do about it.
+    pub fn remedy(&self) -> Option<String> {
+        let text = match self {
+            Self::IsFolder { .. } => "name a file inside the folder",
+            Self::NoFolder { .. } => "make the folder first, or choose another place",
+            Self::NotFolder { .. } => "choose another place; nothing was replaced",
+            Self::Io { .. } => "check the permissions and the space left; nothing was written",
+        };
+        Some(text.to_owned())
+    }
+}
+
 /// A file that comes into being on [`PendingFile::commit`]; dropped before that, it never was.
 #[derive(Debug)]
 pub struct PendingFile {

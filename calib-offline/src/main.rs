@@ -1,2 +1,7 @@
-//! The command line.
-fn main() {}
+//! The command line; everything is in [`calib_offline::cli`].
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    calib_offline::cli::main()
+}

@@ -1,5 +1,14 @@
 //! What a calibration says of itself: `calibration.json` and the report page. Computes nothing new.
 
+pub mod facts;
+pub mod html;
+pub mod plot;
 pub mod record;
+pub mod store;
+pub mod text;
 
+#[cfg(test)]
+pub(crate) mod example;
+
+pub use html::BlobFacts;
 pub use record::Calibration;

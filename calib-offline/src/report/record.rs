@@ -5,7 +5,7 @@ use crate::board::BoardSpec;
 pub use crate::evaluate::verdict::{Grade, Verdict};
 use crate::field::Rig;
 use crate::geometry::{PixelPoint, RigidTransform};
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Name and version of the format.
@@ -34,6 +34,9 @@ pub struct Calibration {
     pub rig: Rig,
     /// Every pose used.
     pub poses: Vec<PoseRecord>,
+    /// The stage's axis per placement, if the dataset says which placement poses belong to.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stage_axes: Vec<StageAxis>,
     /// Every corner offered to the estimate.
     pub corners: Vec<CornerRecord>,
     /// What was left out, and why.
@@ -58,6 +61,21 @@ pub struct PoseRecord {
     pub rms_px: Vec<Option<f64>>,
     /// Dial reading, if the dataset has one.
     pub stage_angle_deg: Option<f64>,
+}
+
+/// The axis that the boards of one placement turned about, rig frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StageAxis {
+    /// Number of the placement.
+    pub placement: usize,
+    /// Poses that it was found from.
+    pub poses: usize,
+    /// The point of the axis nearest to the boards' middle, mm.
+    pub point_mm: Vector3<f64>,
+    /// Unit vector along it.
+    pub direction: Vector3<f64>,
+    /// RMS over pairs of poses of the part of their turn that is not about the axis, rad.
+    pub wobble_rms_rad: f64,
 }
 
 /// One corner offered to the estimate.

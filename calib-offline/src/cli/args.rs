@@ -1,0 +1,79 @@
+//! What can be written on the command line. Each help text starts with an example.
+
+use super::{calibrate, demo, inspect, measure, pack};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::num::NonZeroUsize;
+
+const EXAMPLE: &str = "\
+Example:
+  calib-offline calibrate recordings/monday -o results/monday
+  calib-offline measure results/monday/rig.rays matches.csv -o points.csv";
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0  done
+  1  done, but the verdict is \"fail\"
+  2  usage, file or format error
+  3  the data cannot determine the answer
+
+Results go to standard output, narration and progress to standard error. Files are written whole
+or not at all. With --json, standard output holds one object with a \"schema\" field and nothing
+else, for errors too.";
+
+/// Calibrates cameras with one ray per pixel, from a chessboard.
+#[derive(Debug, Parser)]
+#[command(name = "calib-offline", version, before_help = EXAMPLE, after_help = EXIT_CODES, max_term_width = 100)]
+pub struct Cli {
+    /// What holds for every verb.
+    #[command(flatten)]
+    pub common: CommonArgs,
+    /// What to do.
+    #[command(subcommand)]
+    pub verb: Verb,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Verb {
+    /// Calibrate from a dataset: calibration.json, rig.rays and report.html
+    Calibrate(calibrate::CalibrateArgs),
+    /// Run the whole chain on the data that comes with the program
+    Demo(demo::DemoArgs),
+    /// Say what a dataset, a calibration or a blob is
+    Inspect(inspect::InspectArgs),
+    /// Triangulate matches
+    Measure(measure::MeasureArgs),
+    /// Pack a calibration for the device within a proven error
+    Pack(pack::PackArgs),
+}
+
+/// What holds for every verb.
+#[derive(Debug, Clone, Args)]
+pub struct CommonArgs {
+    /// Print one JSON object to standard output and nothing else
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Say nothing but errors on standard error
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Say more; twice says most
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    pub verbose: u8,
+    /// Color the words that matter; NO_COLOR in the environment is respected
+    #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
+    pub color: ColorChoice,
+    /// Use so many threads [default: all]; results do not depend on it
+    #[arg(long, global = true, value_name = "COUNT")]
+    pub threads: Option<NonZeroUsize>,
+}
+
+/// When to color.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ColorChoice {
+    /// On a terminal.
+    Auto,
+    /// Everywhere.
+    Always,
+    /// Nowhere.
+    Never,
+}

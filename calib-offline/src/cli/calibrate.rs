@@ -1,0 +1,194 @@
+//! `calibrate`: a dataset to `calibration.json`, `rig.rays` and `report.html`.
+
+use super::Outcome;
+use super::output::Console;
+use super::place::check_results_folder;
+use crate::atomic_file::{make_folder, write_set};
+use crate::dataset::Dataset;
+use crate::error::{Error, UsageError};
+use crate::pack::{PackSettings, pack};
+use crate::pipeline::{CalibrateSettings, Method};
+use crate::progress::Progress;
+use crate::report::facts::Facts;
+use crate::report::record::Grade;
+use crate::report::{BlobFacts, Calibration, html, text};
+use clap::Args;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+const EXAMPLE: &str = "\
+Example:
+  calib-offline calibrate recordings/monday -o results/monday
+  calib-offline calibrate recordings/monday -o results/without --exclude 3,17";
+
+const FORMATS: &str = "\
+DATASET is a folder with dataset.toml and corners.csv or images; corners win. The output folder is
+made if need be and then holds calibration.json (every number), rig.rays (the blob for the device)
+and report.html. Results that stand there already are replaced only with --force.
+
+With --json: schema calib-offline/calibrate/1, verdict, reasons, held_out_*, rms_px, sigma_px,
+cameras, baseline_mm, working_distance_mm, counts of poses, views and corners, left_out, blob,
+calibration, rig, report (the three files).";
+
+/// The blob's bound unless `pack` is asked for another, px: well below the noise of any corner.
+pub const BLOB_MAX_ERROR_PX: f64 = 0.001;
+
+/// Names of the files written, in the output folder.
+pub const FILES: [&str; 3] = ["calibration.json", "rig.rays", "report.html"];
+
+/// The arguments.
+#[derive(Debug, Args)]
+#[command(before_help = EXAMPLE, after_help = FORMATS)]
+pub struct CalibrateArgs {
+    /// The folder with dataset.toml
+    #[arg(value_name = "DATASET")]
+    pub dataset: PathBuf,
+    /// The folder for the results
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// How to estimate
+    #[arg(long, default_value = "joint")]
+    pub method: Method,
+    /// Leave these poses out, besides those that the manifest leaves out
+    #[arg(long, value_name = "POSE", value_delimiter = ',')]
+    pub exclude: Vec<usize>,
+    /// Seed of everything drawn at random
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Replace results that stand in the output folder
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// What estimates: `pipeline::calibrate`, or a stand-in in tests.
+pub type Estimate<'a> =
+    &'a dyn Fn(&Dataset, &CalibrateSettings, &dyn Progress) -> Result<Calibration, Error>;
+
+/// A calibration and where its files are.
+#[derive(Debug)]
+pub struct Written {
+    /// The result.
+    pub calibration: Calibration,
+    /// The blob's size and error.
+    pub blob: BlobFacts,
+    /// The three files, in the order of [`FILES`].
+    pub files: [PathBuf; 3],
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct CalibrateObject<'a> {
+    schema: &'static str,
+    #[serde(flatten)]
+    facts: Facts,
+    blob: BlobFacts,
+    calibration: &'a Path,
+    rig: &'a Path,
+    report: &'a Path,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Error`], with nothing written.
+pub fn run(
+    args: &CalibrateArgs,
+    console: &Console,
+    estimate: Estimate<'_>,
+) -> Result<Outcome, Error> {
+    if args.method == Method::Alternating {
+        return Err(Error::Usage(UsageError::NoSuchMethod {
+            method: args.method.name(),
+        }));
+    }
+    check_results_folder(&args.output, &FILES, args.force)?;
+    let mut dataset = Dataset::load(&args.dataset)?;
+    dataset.excluded_poses.extend(&args.exclude);
+    let settings = CalibrateSettings {
+        method: args.method,
+        seed: args.seed,
+    };
+    let written = calibrate_into(&args.output, &dataset, &settings, console, estimate)?;
+    let [calibration, rig, report] = &written.files;
+    let object = CalibrateObject {
+        schema: "calib-offline/calibrate/1",
+        facts: Facts::of(&written.calibration),
+        blob: written.blob,
+        calibration,
+        rig,
+        report,
+    };
+    let words = text::summary(&written.calibration, Some(&written.blob));
+    console.result(&words, &object);
+    console.narrate(&format!(
+        "look at {}; then: calib-offline measure {} MATCHES.csv -o POINTS.csv",
+        report.display(),
+        rig.display()
+    ));
+    Ok(match object.facts.verdict {
+        Grade::Fail => Outcome::VerdictFail,
+        Grade::Pass | Grade::Doubtful => Outcome::Done,
+    })
+}
+
+/// Estimates, packs, draws the report and writes the three files together.
+///
+/// # Errors
+/// [`Error`], with nothing written.
+pub fn calibrate_into(
+    folder: &Path,
+    dataset: &Dataset,
+    settings: &CalibrateSettings,
+    console: &Console,
+    estimate: Estimate<'_>,
+) -> Result<Written, Error> {
+    if dataset.corners_path().exists() && dataset.has_images() {
+        console.narrate("there are images and corners.csv: the corners are used");
+    }
+    let calibration = estimate(dataset, settings, console.progress())?;
+    console.progress().begin("packing the blob", 0);
+    let packed = pack(
+        &calibration.rig,
+        &pack_settings(&calibration, BLOB_MAX_ERROR_PX),
+    );
+    console.progress().end();
+    let packed = packed?;
+    let blob = BlobFacts {
+        bytes: packed.bytes.len(),
+        max_error_px: packed.worst_error_px,
+    };
+    let json = calibration.to_json()?;
+    let page = html::page(&calibration, Some(&blob));
+    let files = FILES.map(|name| folder.join(name));
+    let existed = folder.exists();
+    make_folder(folder)?;
+    let contents = [json.as_slice(), packed.bytes.as_slice(), page.as_bytes()];
+    let set: Vec<(PathBuf, &[u8])> = files.iter().cloned().zip(contents).collect();
+    if let Err(error) = write_set(&set) {
+        if !existed {
+            // Only if it is empty, and only the innermost: then it is the one just made.
+            let _ = std::fs::remove_dir(folder);
+        }
+        return Err(error.into());
+    }
+    Ok(Written {
+        calibration,
+        blob,
+        files,
+    })
+}
+
+/// How a calibration is packed: at its working distance, under its own identity.
+pub fn pack_settings(calibration: &Calibration, max_error_px: f64) -> PackSettings {
+    let working_distance_mm = Facts::of(calibration)
+        .working_distance_mm
+        .map_or(PackSettings::default().working_distance_mm, |d| d.median);
+    PackSettings {
+        max_error_px,
+        working_distance_mm,
+        identity: calibration.identity(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,164 @@
+use super::*;
+use crate::cli::settings::{Narration, Settings};
+use crate::dataset::{CornersError, SufficiencyError};
+use crate::report::example;
+use std::fs;
+
+fn console() -> Console {
+    Console::new(Settings {
+        json: true,
+        narration: Narration::Errors,
+        color: false,
+        bars: false,
+    })
+}
+
+/// A dataset with one corner: enough for a stand-in that does not look at it.
+fn dataset(folder: &Path) {
+    fs::write(
+        folder.join("dataset.toml"),
+        "[board]\nrows = 5\ncols = 4\nsquare_mm = 10\n[[camera]]\nname = \"left\"\nwidth = 640\nheight = 480\n",
+    )
+    .unwrap();
+    fs::write(
+        folder.join("corners.csv"),
+        "camera,pose,row,col,u,v\nleft,0,0,0,1,1\n",
+    )
+    .unwrap();
+}
+
+fn args(folder: &Path) -> CalibrateArgs {
+    CalibrateArgs {
+        dataset: folder.to_owned(),
+        output: folder.join("deep/results"),
+        method: Method::Joint,
+        exclude: vec![3, 17],
+        seed: 1,
+        force: false,
+    }
+}
+
+/// A calibration coarse enough to pack quickly.
+fn quick() -> Calibration {
+    let mut calibration = example::calibration();
+    for camera in &mut calibration.rig.cameras {
+        camera.coverage.covered.fill(false);
+        let middle = camera.coverage.covered.len() / 2;
+        camera.coverage.covered[middle + 20] = true;
+    }
+    calibration
+}
+
+#[test]
+fn all_three_files_are_written_and_belong_together() {
+    let folder = tempfile::tempdir().unwrap();
+    dataset(folder.path());
+    let args = args(folder.path());
+    let excluded = std::cell::RefCell::new(Vec::new());
+    let estimate = |dataset: &Dataset, _: &CalibrateSettings, _: &dyn Progress| {
+        excluded.borrow_mut().extend(&dataset.excluded_poses);
+        Ok(quick())
+    };
+    assert_eq!(run(&args, &console(), &estimate).unwrap(), Outcome::Done);
+    assert_eq!(excluded.into_inner(), [3, 17]);
+    let mut names: Vec<_> = fs::read_dir(&args.output)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    assert_eq!(names, ["calibration.json", "report.html", "rig.rays"]);
+
+    let calibration = Calibration::load(&args.output.join("calibration.json")).unwrap();
+    assert_eq!(calibration, quick());
+    let bytes = crate::pack::read_aligned(&args.output.join("rig.rays")).unwrap();
+    let blob = ray_runtime::RayBlob::open(&bytes).unwrap();
+    assert_eq!(blob.identity(), &calibration.identity());
+    let page = fs::read_to_string(args.output.join("report.html")).unwrap();
+    assert!(page.contains(&format!("{} bytes", bytes.len())));
+
+    // Not twice into one place, unless forced; and then the same bytes.
+    let before = fs::read(args.output.join("report.html")).unwrap();
+    let error = run(&args, &console(), &estimate_never).unwrap_err();
+    assert!(matches!(error, Error::Usage(UsageError::Exists { .. })));
+    let forced = CalibrateArgs {
+        force: true,
+        ..args
+    };
+    run(&forced, &console(), &|_, _, _| Ok(quick())).unwrap();
+    assert_eq!(fs::read(forced.output.join("report.html")).unwrap(), before);
+}
+
+fn estimate_never(
+    _: &Dataset,
+    _: &CalibrateSettings,
+    _: &dyn Progress,
+) -> Result<Calibration, Error> {
+    panic!("refused too late")
+}
+
+#[test]
+fn a_failed_verdict_is_written_and_told() {
+    let folder = tempfile::tempdir().unwrap();
+    dataset(folder.path());
+    let args = args(folder.path());
+    let mut calibration = quick();
+    calibration.verdict.grade = Grade::Fail;
+    let outcome = run(&args, &console(), &|_, _, _| Ok(calibration.clone())).unwrap();
+    assert_eq!(outcome, Outcome::VerdictFail);
+    assert!(args.output.join("report.html").is_file());
+}
+
+#[test]
+fn an_estimate_that_fails_leaves_no_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    dataset(folder.path());
+    let args = args(folder.path());
+    let error = run(&args, &console(), &|_, _, _| {
+        Err(Error::Sufficiency(SufficiencyError::NoCorners))
+    })
+    .unwrap_err();
+    assert_eq!(error.exit_code(), 3);
+    assert!(!folder.path().join("deep").exists());
+
+    // A result that cannot be packed leaves none either.
+    let mut empty = quick();
+    empty.rig.cameras[0].coverage.covered.fill(false);
+    let error = run(&args, &console(), &|_, _, _| Ok(empty.clone())).unwrap_err();
+    assert_eq!(error.exit_code(), 3);
+    assert!(!folder.path().join("deep").exists());
+}
+
+#[test]
+fn an_output_that_is_a_file_is_refused_before_any_work() {
+    let folder = tempfile::tempdir().unwrap();
+    dataset(folder.path());
+    let mut args = args(folder.path());
+    args.output = folder.path().join("corners.csv");
+    let error = run(&args, &console(), &estimate_never).unwrap_err();
+    assert!(matches!(error, Error::Write(_)));
+    assert_eq!(error.exit_code(), 2);
+}
+
+#[test]
+fn the_published_procedure_is_not_in_this_version() {
+    let folder = tempfile::tempdir().unwrap();
+    dataset(folder.path());
+    let mut args = args(folder.path());
+    args.method = Method::Alternating;
+    let error = run(&args, &console(), &estimate_never).unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+}
+
+#[test]
+fn a_dataset_with_broken_corners_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    dataset(folder.path());
+    fs::write(folder.path().join("corners.csv"), "").unwrap();
+    let error = run(
+        &args(folder.path()),
+        &console(),
+        &crate::pipeline::calibrate,
+    )
+    .unwrap_err();
+    assert!(matches!(error, Error::Corners(CornersError::Empty { .. })));
+}

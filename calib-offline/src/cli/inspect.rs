@@ -1,0 +1,318 @@
+//! `inspect`: what a dataset, a calibration or a blob is.
+
+use super::Outcome;
+use super::output::Console;
+use super::rig_file::{RigFile, open};
+use crate::dataset::split::without_excluded;
+use crate::dataset::{Dataset, load_corners};
+use crate::error::{Error, UsageError};
+use crate::evaluate::Capture;
+use crate::report::facts::Facts;
+use crate::report::text::{short, summary};
+use clap::Args;
+use ray_runtime::RayBlob;
+use serde::Serialize;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+const EXAMPLE: &str = "\
+Example:
+  calib-offline inspect recordings/monday
+  calib-offline inspect results/monday/rig.rays --json";
+
+const FORMATS: &str = "\
+FILE is a dataset (its folder or its dataset.toml), a calibration.json or a blob. For a dataset it
+says which views and which parts of the sensor are covered, and what to record besides.
+
+With --json: schema calib-offline/inspect/1 and kind, which is
+  dataset      folder, rows, cols, square_mm, stage, excluded, source (corners, images or both),
+               cameras (name, sensor_px, images), capture (poses, poses_seen_by_all, cameras,
+               warnings; null before detect)
+  calibration  tool_version, method, input_sha256, and the facts that calibrate prints
+  blob         bytes, identity, frame, written_by, max_error_px, working_distance_mm, self_tests,
+               cameras (name, sensor_px, region_px, cells, central, position_mm)";
+
+/// The arguments.
+#[derive(Debug, Args)]
+#[command(before_help = EXAMPLE, after_help = FORMATS)]
+pub struct InspectArgs {
+    /// A dataset, a calibration.json or a blob
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct InspectObject {
+    schema: &'static str,
+    #[serde(flatten)]
+    kind: Kind,
+}
+
+#[derive(Debug, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+enum Kind {
+    Dataset(DatasetObject),
+    Calibration(CalibrationObject),
+    Blob(BlobObject),
+}
+
+#[derive(Debug, Serialize)]
+struct DatasetObject {
+    folder: PathBuf,
+    rows: usize,
+    cols: usize,
+    square_mm: f64,
+    stage: bool,
+    excluded: Vec<usize>,
+    source: &'static str,
+    cameras: Vec<DatasetCamera>,
+    capture: Option<Capture>,
+}
+
+#[derive(Debug, Serialize)]
+struct DatasetCamera {
+    name: String,
+    sensor_px: [u32; 2],
+    images: usize,
+}
+
+#[derive(Debug, Serialize)]
+struct CalibrationObject {
+    tool_version: String,
+    method: String,
+    input_sha256: String,
+    #[serde(flatten)]
+    facts: Facts,
+}
+
+#[derive(Debug, Serialize)]
+struct BlobObject {
+    bytes: usize,
+    identity: String,
+    frame: String,
+    written_by: String,
+    max_error_px: f32,
+    working_distance_mm: f32,
+    self_tests: usize,
+    cameras: Vec<BlobCamera>,
+}
+
+#[derive(Debug, Serialize)]
+struct BlobCamera {
+    name: String,
+    sensor_px: [u32; 2],
+    /// First column, first row, columns, rows.
+    region_px: [u32; 4],
+    cells: [u32; 2],
+    central: bool,
+    position_mm: [f32; 3],
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Error`].
+pub fn run(args: &InspectArgs, console: &Console) -> Result<Outcome, Error> {
+    let file = &args.file;
+    let is_dataset = file.is_dir() || file.extension().is_some_and(|e| e == "toml");
+    let (words, kind) = if is_dataset {
+        let object = dataset_object(file)?;
+        (dataset_words(&object), Kind::Dataset(object))
+    } else {
+        match RigFile::read(file).map_err(any_kind)? {
+            RigFile::Calibration(calibration) => {
+                let object = CalibrationObject {
+                    tool_version: calibration.tool_version.clone(),
+                    method: calibration.method.clone(),
+                    input_sha256: calibration.input_sha256.clone(),
+                    facts: Facts::of(&calibration),
+                };
+                let words = format!(
+                    "calibration     by calib-offline {}, method {}, input {}\n{}",
+                    object.tool_version,
+                    object.method,
+                    object
+                        .input_sha256
+                        .get(..12)
+                        .unwrap_or(&object.input_sha256),
+                    summary(&calibration, None)
+                );
+                (words, Kind::Calibration(object))
+            }
+            RigFile::Blob(bytes) => {
+                let object = blob_object(&open(&bytes, file)?);
+                (blob_words(&object), Kind::Blob(object))
+            }
+        }
+    };
+    let object = InspectObject {
+        schema: "calib-offline/inspect/1",
+        kind,
+    };
+    console.result(&words, &object);
+    Ok(Outcome::Done)
+}
+
+/// A file that is no rig could have been a dataset as well.
+fn any_kind(error: Error) -> Error {
+    match error {
+        Error::Usage(UsageError::UnknownKind { path, .. }) => {
+            Error::Usage(UsageError::UnknownKind {
+                path,
+                expected: "a dataset folder, a dataset.toml, a calibration.json or a blob",
+            })
+        }
+        other => other,
+    }
+}
+
+fn dataset_object(path: &Path) -> Result<DatasetObject, Error> {
+    let dataset = Dataset::load(path)?;
+    let corners = load_corners(&dataset)?;
+    let source = match (corners.is_some(), dataset.has_images()) {
+        (true, true) => "both",
+        (true, false) => "corners",
+        (false, _) => "images",
+    };
+    let capture = corners.map(|views| {
+        let selection = without_excluded(views, &dataset.excluded_poses);
+        Capture::of(&dataset, &selection.used)
+    });
+    Ok(DatasetObject {
+        rows: dataset.board.rows,
+        cols: dataset.board.cols,
+        square_mm: dataset.board.square_mm,
+        stage: dataset.stage.is_some(),
+        excluded: dataset.excluded_poses.iter().copied().collect(),
+        source,
+        cameras: dataset
+            .cameras
+            .iter()
+            .map(|camera| DatasetCamera {
+                name: camera.name.clone(),
+                sensor_px: [camera.sensor.width, camera.sensor.height],
+                images: camera.images.iter().flatten().count(),
+            })
+            .collect(),
+        capture,
+        folder: dataset.folder,
+    })
+}
+
+fn dataset_words(object: &DatasetObject) -> String {
+    let mut words = format!(
+        "dataset         {}\nboard           {} rows x {} cols of inner corners, {} mm{}\n",
+        object.folder.display(),
+        object.rows,
+        object.cols,
+        object.square_mm,
+        if object.stage { ", on a stage" } else { "" }
+    );
+    // Writing to a String cannot fail.
+    for camera in &object.cameras {
+        let [width, height] = camera.sensor_px;
+        let _ = writeln!(
+            words,
+            "camera          {}, {width} x {height} px, {} images",
+            camera.name, camera.images
+        );
+    }
+    if !object.excluded.is_empty() {
+        let _ = writeln!(words, "excluded        poses {:?}", object.excluded);
+    }
+    let Some(capture) = &object.capture else {
+        words
+            .push_str("corners         none yet: run calib-offline detect, or calibrate at once\n");
+        return words;
+    };
+    if object.source == "both" {
+        words.push_str("corners         corners.csv is used, the images are not\n");
+    }
+    let _ = writeln!(
+        words,
+        "poses           {}, {} of them seen by every camera",
+        capture.poses, capture.poses_seen_by_all
+    );
+    for camera in &capture.cameras {
+        let per_view = camera
+            .corners_per_view
+            .map_or(String::new(), |[least, median, most]| {
+                format!(", {median} a view ({least} to {most})")
+            });
+        let _ = writeln!(
+            words,
+            "{:<15} {} views, {} corners{per_view}, {:.0} % of the sensor would be calibrated",
+            camera.name,
+            camera.views,
+            camera.corners,
+            100.0 * camera.covered_share
+        );
+    }
+    for warning in &capture.warnings {
+        let _ = writeln!(words, "look at         {warning}");
+    }
+    words
+}
+
+fn blob_object(blob: &RayBlob<'_>) -> BlobObject {
+    BlobObject {
+        bytes: blob.len(),
+        identity: blob.identity().iter().fold(String::new(), |mut hex, byte| {
+            let _ = write!(hex, "{byte:02x}");
+            hex
+        }),
+        frame: blob.frame().to_owned(),
+        written_by: blob.written_by().to_owned(),
+        max_error_px: blob.max_error_px(),
+        working_distance_mm: blob.working_distance_mm(),
+        self_tests: blob.self_tests().count(),
+        cameras: (0..blob.camera_count())
+            .filter_map(|k| blob.camera(k))
+            .map(|camera| BlobCamera {
+                name: camera.name.to_owned(),
+                sensor_px: [camera.sensor_width, camera.sensor_height],
+                region_px: [
+                    camera.region.u,
+                    camera.region.v,
+                    camera.region.width,
+                    camera.region.height,
+                ],
+                cells: camera.cells,
+                central: camera.is_central,
+                position_mm: camera.rig_from_camera.translation_mm.into(),
+            })
+            .collect(),
+    }
+}
+
+fn blob_words(object: &BlobObject) -> String {
+    let mut words = format!(
+        "blob            {} bytes, identity {}, by {}\nframe           {}, mm\nerror           every ray within {} px of the calibration, offsets judged at {} mm\nself-tests      {}\n",
+        object.bytes,
+        object.identity,
+        object.written_by,
+        object.frame,
+        short(f64::from(object.max_error_px)),
+        short(f64::from(object.working_distance_mm)),
+        object.self_tests
+    );
+    for camera in &object.cameras {
+        let [width, height] = camera.sensor_px;
+        let [x, y, z] = camera.position_mm;
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            words,
+            "camera          {}, {width} x {height} px, {} x {} cells, {}, at ({x:.2}, {y:.2}, {z:.2}) mm",
+            camera.name,
+            camera.cells[0],
+            camera.cells[1],
+            if camera.central {
+                "central"
+            } else {
+                "non-central"
+            }
+        );
+    }
+    words
+}

@@ -1,0 +1,173 @@
+//! `measure`: matches to points, with a blob (the device's own code in f32) or a calibration (f64).
+
+use super::Outcome;
+use super::output::Console;
+use super::place::check_file;
+use super::rig_file::{RigFile, open};
+use crate::atomic_file::{PendingFile, WriteError};
+use crate::error::{Error, UsageError};
+use crate::matches::source::{BlobSource, PointSource, RigSource};
+use crate::matches::{MatchesError, MeasureSummary, POINTS_HEADER, StreamError, measure_stream};
+use crate::report::text::short;
+use clap::Args;
+use serde::Serialize;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+const EXAMPLE: &str = "\
+Example:
+  calib-offline measure results/rig.rays matches.csv -o points.csv
+  calib-offline measure results/calibration.json matches.csv -o points.csv --frame left";
+
+const FORMATS: &str = "\
+MATCHES.csv has the header id,u_left,v_left,u_right,v_right, with the names of the rig's cameras.
+Leave both fields of a camera empty where it did not see the point; two must be left.
+POINTS.csv has the header id,x,y,z,gap,sigma_x,sigma_y,sigma_z,status and one row per match, in
+the order of the matches; lengths in mm. The status is ok, outside (of the calibrated area),
+parallel or behind; only ok has numbers.
+
+A blob is evaluated with the device's own library and gives the device's bits; a calibration is
+evaluated in double precision. An earlier POINTS.csv is replaced; any other file only with --force.
+
+With --json: schema calib-offline/measure/1, rig, rig_kind (blob or calibration), frame, output,
+matches, ok, outside, parallel, behind, gap_rms_mm.";
+
+/// The arguments.
+#[derive(Debug, Args)]
+#[command(before_help = EXAMPLE, after_help = FORMATS)]
+pub struct MeasureArgs {
+    /// A blob (*.rays) or a calibration.json
+    #[arg(value_name = "RIG")]
+    pub rig: PathBuf,
+    /// The pixels that belong together; - is standard input
+    #[arg(value_name = "MATCHES.csv")]
+    pub matches: PathBuf,
+    /// Where to write the points
+    #[arg(short, long, value_name = "POINTS.csv")]
+    pub output: PathBuf,
+    /// Give the points in the frame of this camera instead of the rig's
+    #[arg(long, value_name = "CAMERA")]
+    pub frame: Option<String>,
+    /// Replace whatever stands in the output's place
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct MeasureObject<'a> {
+    schema: &'static str,
+    rig: &'a Path,
+    rig_kind: &'static str,
+    frame: &'a str,
+    output: &'a Path,
+    #[serde(flatten)]
+    summary: MeasureSummary,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Error`], with nothing written.
+pub fn run(args: &MeasureArgs, console: &Console) -> Result<Outcome, Error> {
+    check_file(
+        &args.output,
+        POINTS_HEADER.as_bytes(),
+        &[&args.rig, &args.matches],
+        args.force,
+    )?;
+    let frame = args.frame.as_deref();
+    let (kind, summary) = match RigFile::read(&args.rig)? {
+        RigFile::Blob(bytes) => {
+            let blob = open(&bytes, &args.rig)?;
+            let names = names(BlobSource::new(&blob, None));
+            let source = BlobSource::new(&blob, frame);
+            ("blob", measure(args, source.as_ref(), names)?)
+        }
+        RigFile::Calibration(calibration) => {
+            let names = names(RigSource::new(&calibration.rig, None));
+            let source = RigSource::new(&calibration.rig, frame);
+            ("calibration", measure(args, source.as_ref(), names)?)
+        }
+    };
+    let object = MeasureObject {
+        schema: "calib-offline/measure/1",
+        rig: &args.rig,
+        rig_kind: kind,
+        frame: frame.unwrap_or("rig"),
+        output: &args.output,
+        summary,
+    };
+    console.result(&in_words(&object), &object);
+    Ok(Outcome::Done)
+}
+
+fn names(source: Option<impl PointSource>) -> Vec<String> {
+    source.map(|source| source.cameras()).unwrap_or_default()
+}
+
+/// `source` is none where the frame is none of the cameras `known`.
+fn measure<S: PointSource>(
+    args: &MeasureArgs,
+    source: Option<&S>,
+    known: Vec<String>,
+) -> Result<MeasureSummary, Error> {
+    if known.len() < 2 {
+        return Err(Error::Usage(UsageError::OneCamera {
+            path: args.rig.clone(),
+        }));
+    }
+    let Some(source) = source else {
+        return Err(Error::Usage(UsageError::UnknownFrame {
+            name: args.frame.clone().unwrap_or_default(),
+            known,
+        }));
+    };
+    let mut input: Box<dyn Read> = if args.matches.as_os_str() == "-" {
+        Box::new(std::io::stdin().lock())
+    } else {
+        let file = File::open(&args.matches).map_err(|source| MatchesError::Read {
+            file: args.matches.clone(),
+            source,
+        })?;
+        Box::new(file)
+    };
+    let mut output = PendingFile::create(&args.output)?;
+    let summary = measure_stream(source, &args.matches, &mut input, &mut output).map_err(
+        |error| match error {
+            StreamError::Matches(error) => Error::Matches(error),
+            StreamError::Write(source) => Error::Write(WriteError::Io {
+                path: args.output.clone(),
+                source,
+            }),
+        },
+    )?;
+    output.commit()?;
+    Ok(summary)
+}
+
+fn in_words(object: &MeasureObject<'_>) -> String {
+    let summary = &object.summary;
+    let mut parts = vec![format!(
+        "{} of {} matches have a point",
+        summary.ok, summary.matches
+    )];
+    for (count, words) in [
+        (summary.outside, "outside the calibrated area"),
+        (summary.parallel, "with parallel rays"),
+        (summary.behind, "behind a camera"),
+    ] {
+        if count > 0 {
+            parts.push(format!("{count} {words}"));
+        }
+    }
+    if let Some(gap_mm) = summary.gap_rms_mm {
+        parts.push(format!("gap {} mm RMS", short(gap_mm)));
+    }
+    format!(
+        "{}; written to {}",
+        parts.join(", "),
+        object.output.display()
+    )
+}

@@ -1,0 +1,80 @@
+//! What the common arguments and the environment come to.
+
+use super::args::{ColorChoice, CommonArgs};
+use std::io::IsTerminal;
+
+/// How a command shows itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Settings {
+    /// One JSON object on standard output, instead of words.
+    pub json: bool,
+    /// How much is said on standard error.
+    pub narration: Narration,
+    /// Whether words on standard error are colored.
+    pub color: bool,
+    /// Whether standard error is a terminal that can show moving bars.
+    pub bars: bool,
+}
+
+/// How much is said on standard error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Narration {
+    /// Errors.
+    Errors,
+    /// What is being done, and warnings.
+    Usual,
+    /// Details.
+    Details,
+}
+
+impl Settings {
+    /// The settings of this process.
+    pub fn resolve(common: &CommonArgs) -> Self {
+        let terminal = std::io::stderr().is_terminal();
+        let set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+        let dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
+        Self::from_facts(common, terminal && !dumb, set("NO_COLOR"))
+    }
+
+    fn from_facts(common: &CommonArgs, terminal: bool, no_color: bool) -> Self {
+        let narration = match (common.quiet, common.verbose) {
+            (true, _) => Narration::Errors,
+            (false, 0) => Narration::Usual,
+            (false, _) => Narration::Details,
+        };
+        Self {
+            json: common.json,
+            narration,
+            color: match common.color {
+                ColorChoice::Always => true,
+                ColorChoice::Never => false,
+                ColorChoice::Auto => terminal && !no_color,
+            },
+            bars: terminal && narration > Narration::Errors,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn color_is_for_terminals_unless_asked_for_or_refused() {
+        let color = |color, terminal, no_color| {
+            let common = CommonArgs {
+                json: false,
+                quiet: false,
+                verbose: 0,
+                color,
+                threads: None,
+            };
+            Settings::from_facts(&common, terminal, no_color).color
+        };
+        assert!(color(ColorChoice::Auto, true, false));
+        assert!(!color(ColorChoice::Auto, false, false));
+        assert!(!color(ColorChoice::Auto, true, true));
+        assert!(color(ColorChoice::Always, false, true));
+        assert!(!color(ColorChoice::Never, true, false));
+    }
+}

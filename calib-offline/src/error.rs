@@ -1,0 +1,211 @@
+//! What can go wrong, one variant per stage, each wrapping that stage's own error.
+
+use crate::atomic_file::WriteError;
+use crate::dataset::{CornersError, ManifestError, SufficiencyError};
+use crate::matches::MatchesError;
+use crate::pack::PackError;
+use crate::report::store::CalibrationError;
+use std::path::PathBuf;
+
+/// Why a command did not do what it was asked for.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The manifest of a dataset.
+    #[error("the dataset cannot be used")]
+    Manifest(#[from] ManifestError),
+    /// The corners of a dataset.
+    #[error("the corners of the dataset cannot be used")]
+    Corners(#[from] CornersError),
+    /// Corners that no estimate could work with.
+    #[error("these corners cannot determine a calibration")]
+    Sufficiency(#[from] SufficiencyError),
+    /// A calibration that was read.
+    #[error("the calibration cannot be used")]
+    Calibration(#[from] CalibrationError),
+    /// A blob that was read.
+    #[error("the blob cannot be used")]
+    Blob(#[from] BlobError),
+    /// Matches that were read.
+    #[error("the matches cannot be used")]
+    Matches(#[from] MatchesError),
+    /// A rig that was to be packed.
+    #[error("the calibration cannot be packed")]
+    Pack(#[from] PackError),
+    /// A result that JSON cannot say.
+    #[error("the result cannot be written as JSON")]
+    Json(#[from] serde_json::Error),
+    /// A result that was to be written.
+    #[error("the result cannot be written")]
+    Write(#[from] WriteError),
+    /// A request that cannot be met.
+    #[error("the command cannot be run so")]
+    Usage(#[from] UsageError),
+}
+
+/// Why a file is not a blob that this version reads.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BlobError {
+    /// The system refused to read it.
+    #[error("{}: cannot be read", file.display())]
+    Read {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The runtime refused it.
+    #[error("{}: the runtime refuses it", file.display())]
+    Open {
+        /// The file.
+        file: PathBuf,
+        /// What the runtime said.
+        source: ray_runtime::OpenError,
+    },
+}
+
+/// A request that cannot be met.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum UsageError {
+    /// Something stands where the result is to be written.
+    #[error("{}: exists", path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file that is neither of the kinds that the command reads.
+    #[error("{}: is not {expected}", path.display())]
+    UnknownKind {
+        /// The file.
+        path: PathBuf,
+        /// What it could have been.
+        expected: &'static str,
+    },
+    /// There is no such file.
+    #[error("{}: does not exist", path.display())]
+    NotFound {
+        /// The place.
+        path: PathBuf,
+    },
+    /// A frame that the rig does not have.
+    #[error("the rig has no camera \"{name}\" whose frame could be used; it has {}", known.join(", "))]
+    UnknownFrame {
+        /// The name.
+        name: String,
+        /// The rig's cameras.
+        known: Vec<String>,
+    },
+    /// One camera cannot triangulate.
+    #[error("{}: has one camera, a point takes two", path.display())]
+    OneCamera {
+        /// The rig.
+        path: PathBuf,
+    },
+    /// A method that this version does not have.
+    #[error("the method \"{method}\" is not in this version")]
+    NoSuchMethod {
+        /// Its name.
+        method: &'static str,
+    },
+    /// The input would be replaced by the output.
+    #[error("{}: is what the command reads", path.display())]
+    OutputIsInput {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+impl UsageError {
+    /// What to do about it.
+    pub fn remedy(&self) -> Option<String> {
+        let text = match self {
+            Self::Exists { .. } => "choose another place with -o, or replace it with --force",
+            Self::UnknownKind { .. } | Self::NotFound { .. } => "check the path",
+            Self::UnknownFrame { .. } => {
+                "leave --frame out for the rig's own frame, or name one of its cameras"
+            }
+            Self::OneCamera { .. } => {
+                "calibrate two cameras together; a single one gives rays only"
+            }
+            Self::NoSuchMethod { .. } => "leave --method out for the joint estimate",
+            Self::OutputIsInput { .. } => "choose another place with -o",
+        };
+        Some(text.to_owned())
+    }
+}
+
+impl BlobError {
+    /// What to do about it.
+    pub fn remedy(&self) -> Option<String> {
+        use ray_runtime::OpenError;
+        let text = match self {
+            Self::Read { .. } => "check the path and the permissions",
+            Self::Open { source, .. } => match source {
+                OpenError::Truncated { .. } => "the file is cut off: copy it again, binary",
+                OpenError::BadMagic { .. } => {
+                    "this is no .rays file: write one with calib-offline pack"
+                }
+                OpenError::WrongVersion { .. } => {
+                    "pack the calibration again with this version, or read it with the one that wrote it"
+                }
+                OpenError::TrailingBytes { .. } | OpenError::BadCrc { .. } => {
+                    "the file was damaged on the way: copy it again, binary"
+                }
+                _ => "pack the calibration again",
+            },
+        };
+        Some(text.to_owned())
+    }
+}
+
+impl Error {
+    /// The process's exit code: 3 where the data cannot determine the answer, else 2.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Sufficiency(_) | Self::Pack(PackError::NothingCalibrated { .. }) => 3,
+            Self::Manifest(_)
+            | Self::Corners(_)
+            | Self::Calibration(_)
+            | Self::Blob(_)
+            | Self::Matches(_)
+            | Self::Pack(_)
+            | Self::Json(_)
+            | Self::Write(_)
+            | Self::Usage(_) => 2,
+        }
+    }
+
+    /// What to do about it.
+    pub fn remedy(&self) -> Option<String> {
+        match self {
+            Self::Manifest(error) => error.remedy(),
+            Self::Corners(error) => error.remedy(),
+            Self::Sufficiency(error) => error.remedy(),
+            Self::Calibration(error) => error.remedy(),
+            Self::Blob(error) => error.remedy(),
+            Self::Matches(error) => error.remedy(),
+            Self::Pack(error) => pack_remedy(error),
+            Self::Json(_) => None,
+            Self::Write(error) => error.remedy(),
+            Self::Usage(error) => error.remedy(),
+        }
+    }
+}
+
+fn pack_remedy(error: &PackError) -> Option<String> {
+    Some(match error {
+        PackError::BadSetting { .. } => "give a bound in pixels such as 0.001".to_owned(),
+        PackError::BoundNotReached { best_px, .. } => {
+            format!(
+                "ask for more: --max-error-px {:.1e} or above",
+                1.1 * best_px
+            )
+        }
+        PackError::NothingCalibrated { .. } => {
+            "calibrate with corners over more of the sensor".to_owned()
+        }
+        _ => return None,
+    })
+}

@@ -1,0 +1,185 @@
+//! Who turns a match into a point: a calibration in f64, or a blob with the device's own f32 code.
+
+use crate::field::{MeasureError, Rig};
+use crate::geometry::{PixelPoint, RigidTransform, TriangulateError};
+use nalgebra::{RealField, Vector3};
+use ray_runtime::RayBlob;
+use std::str::FromStr;
+
+/// The numbers that a source computes with. Pixels are read straight into it and points written
+/// with the shortest digits that read back to the same bits.
+pub trait Number: RealField + Copy + FromStr + zmij::Float + Into<f64> + Send + Sync {}
+
+impl Number for f32 {}
+impl Number for f64 {}
+
+/// Camera index and pixel (u, v).
+pub type Sighting<N> = (usize, [N; 2]);
+
+/// Why a match has no point, as `POINTS.csv` says it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// A pixel lies outside its camera's calibrated area.
+    Outside,
+    /// The rays are parallel.
+    Parallel,
+    /// The rays meet behind a camera.
+    Behind,
+}
+
+impl Status {
+    /// The word in the file.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Outside => "outside",
+            Self::Parallel => "parallel",
+            Self::Behind => "behind",
+        }
+    }
+}
+
+/// A triangulated match.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point<N> {
+    /// In the frame asked for, mm.
+    pub point_mm: [N; 3],
+    /// Length of the common perpendicular, mm.
+    pub gap_mm: N,
+}
+
+/// Turns matches into points.
+pub trait PointSource: Sync {
+    /// What it computes with.
+    type Number: Number;
+
+    /// The names of the rig's cameras, in order.
+    fn cameras(&self) -> Vec<String>;
+
+    /// The point seen by two or more cameras.
+    ///
+    /// # Errors
+    /// [`Status`] where there is none.
+    fn point(&self, sightings: &[Sighting<Self::Number>]) -> Result<Point<Self::Number>, Status>;
+}
+
+/// A calibration, evaluated in f64.
+#[derive(Debug)]
+pub struct RigSource<'a> {
+    rig: &'a Rig,
+    frame_from_rig: Option<RigidTransform>,
+}
+
+impl<'a> RigSource<'a> {
+    /// Points in the rig frame, or in the frame of one camera; `None` if there is no such camera.
+    pub fn new(rig: &'a Rig, camera_frame: Option<&str>) -> Option<Self> {
+        let frame_from_rig = match camera_frame {
+            None => None,
+            Some(name) => {
+                let camera = &rig.cameras[rig.camera_idx(name)?];
+                Some(camera.rig_from_camera.inverse())
+            }
+        };
+        Some(Self {
+            rig,
+            frame_from_rig,
+        })
+    }
+}
+
+impl PointSource for RigSource<'_> {
+    type Number = f64;
+
+    fn cameras(&self) -> Vec<String> {
+        self.rig.cameras.iter().map(|c| c.name.clone()).collect()
+    }
+
+    fn point(&self, sightings: &[Sighting<f64>]) -> Result<Point<f64>, Status> {
+        let result = match *sightings {
+            [a, b] => self.rig.triangulate(&[pixel(a), pixel(b)]),
+            _ => {
+                let sightings: Vec<_> = sightings.iter().copied().map(pixel).collect();
+                self.rig.triangulate(&sightings)
+            }
+        };
+        let found = result.map_err(|error| match error {
+            MeasureError::Outside { .. } => Status::Outside,
+            MeasureError::Triangulate(TriangulateError::Behind) => Status::Behind,
+            MeasureError::Triangulate(_) => Status::Parallel,
+        })?;
+        let point_mm = match &self.frame_from_rig {
+            None => found.point_mm,
+            Some(frame_from_rig) => frame_from_rig.point(&found.point_mm),
+        };
+        Ok(Point {
+            point_mm: point_mm.into(),
+            gap_mm: found.gap_mm,
+        })
+    }
+}
+
+fn pixel((camera_idx, [u, v]): Sighting<f64>) -> (usize, PixelPoint) {
+    (camera_idx, PixelPoint::new(u, v))
+}
+
+/// A blob, evaluated by the device's own library.
+#[derive(Debug)]
+pub struct BlobSource<'a> {
+    blob: &'a RayBlob<'a>,
+    /// Turned about the origin after subtracting the camera's place.
+    rig_from_frame: Option<ray_runtime::RigFromCamera>,
+}
+
+impl<'a> BlobSource<'a> {
+    /// Points in the blob's frame, or in the frame of one camera; `None` if there is no such
+    /// camera.
+    pub fn new(blob: &'a RayBlob<'a>, camera_frame: Option<&str>) -> Option<Self> {
+        let rig_from_frame = match camera_frame {
+            None => None,
+            Some(name) => Some(blob.camera(blob.camera_index(name)?)?.rig_from_camera),
+        };
+        Some(Self {
+            blob,
+            rig_from_frame,
+        })
+    }
+}
+
+impl PointSource for BlobSource<'_> {
+    type Number = f32;
+
+    fn cameras(&self) -> Vec<String> {
+        (0..self.blob.camera_count())
+            .filter_map(|k| self.blob.camera(k))
+            .map(|camera| camera.name.to_owned())
+            .collect()
+    }
+
+    fn point(&self, sightings: &[Sighting<f32>]) -> Result<Point<f32>, Status> {
+        let pixel =
+            |(camera_idx, [u, v]): Sighting<f32>| (camera_idx, ray_runtime::PixelPoint::new(u, v));
+        let result = match *sightings {
+            [a, b] => self.blob.triangulate(pixel(a), pixel(b)),
+            _ => {
+                let sightings: Vec<_> = sightings.iter().copied().map(pixel).collect();
+                self.blob.triangulate_many(&sightings)
+            }
+        };
+        let found = result.map_err(|error| match error {
+            ray_runtime::MeasureError::Behind => Status::Behind,
+            ray_runtime::MeasureError::Parallel => Status::Parallel,
+            _ => Status::Outside,
+        })?;
+        let point_mm = match &self.rig_from_frame {
+            None => found.point_mm,
+            Some(rig_from_frame) => in_frame(rig_from_frame, &found.point_mm),
+        };
+        Ok(Point {
+            point_mm: point_mm.into(),
+            gap_mm: found.gap_mm(),
+        })
+    }
+}
+
+fn in_frame(rig_from_frame: &ray_runtime::RigFromCamera, point_mm: &Vector3<f32>) -> Vector3<f32> {
+    rig_from_frame.rotation.transpose() * (point_mm - rig_from_frame.translation_mm)
+}

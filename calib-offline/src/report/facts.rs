@@ -1,0 +1,175 @@
+//! The few numbers that stand at the top of every summary: on the page, on the terminal, in JSON.
+//! Each is read or measured off the record; nothing is estimated here.
+
+use super::record::{Calibration, Grade};
+use serde::Serialize;
+use std::collections::BTreeSet;
+
+/// What a reader wants to know first.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Facts {
+    /// The judgement.
+    pub verdict: Grade,
+    /// Its reasons.
+    pub reasons: Vec<String>,
+    /// RMS error of neighboring-corner distances on boards never seen, % of the square.
+    pub held_out_neighbor_percent: Option<f64>,
+    /// The same, mm.
+    pub held_out_neighbor_mm: Option<f64>,
+    /// RMS distance of triangulated corners from the rigid board, mm.
+    pub held_out_rigid_mm: Option<f64>,
+    /// RMS residual vector of held-out corners, px.
+    pub held_out_rms_px: Option<f64>,
+    /// RMS residual vector of the corners used, px.
+    pub rms_px: f64,
+    /// Noise per axis, px.
+    pub sigma_px: f64,
+    /// Cameras in the rig's order.
+    pub cameras: Vec<CameraFacts>,
+    /// Distance from the first camera to each other one, mm.
+    pub baseline_mm: Vec<f64>,
+    /// From the cameras to the boards.
+    pub working_distance_mm: Option<Spread>,
+    /// Poses used.
+    pub poses_used: usize,
+    /// Images (pose and camera) used.
+    pub views_used: usize,
+    /// Images or poses left out, each with a reason in the record.
+    pub left_out: usize,
+    /// Corners used.
+    pub corners_used: usize,
+    /// Corners rejected as outliers.
+    pub corners_rejected: usize,
+}
+
+/// What a reader wants to know of one camera.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CameraFacts {
+    /// Its name.
+    pub name: String,
+    /// Width and height of its sensor, px.
+    pub sensor_px: [u32; 2],
+    /// Share of the sensor that is calibrated, 0 to 1.
+    pub covered_share: f64,
+    /// Images used.
+    pub views: usize,
+    /// Whether all rays meet in one point by construction.
+    pub central: bool,
+}
+
+/// Smallest, middle and largest of some lengths.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Spread {
+    /// Smallest.
+    pub least: f64,
+    /// Half are smaller.
+    pub median: f64,
+    /// Largest.
+    pub most: f64,
+}
+
+impl Facts {
+    /// Reads the facts off a record.
+    pub fn of(calibration: &Calibration) -> Self {
+        let held_out = calibration.held_out.as_ref();
+        let neighbor_percent = held_out.and_then(|h| h.neighbor_rms_percent);
+        let cameras = &calibration.rig.cameras;
+        let views: BTreeSet<(usize, usize)> = calibration
+            .corners
+            .iter()
+            .map(|c| (c.camera_idx, c.pose))
+            .collect();
+        let place = |k: usize| cameras[k].rig_from_camera.translation_mm;
+        Self {
+            verdict: calibration.verdict.grade,
+            reasons: calibration.verdict.reasons.clone(),
+            held_out_neighbor_percent: neighbor_percent,
+            held_out_neighbor_mm: neighbor_percent
+                .map(|percent| percent / 100.0 * calibration.board.square_mm),
+            held_out_rigid_mm: held_out.and_then(|h| h.rigid_rms_mm),
+            held_out_rms_px: held_out.and_then(|h| h.rms_px),
+            rms_px: calibration.estimate.rms_px,
+            sigma_px: calibration.estimate.sigma_px,
+            cameras: cameras
+                .iter()
+                .enumerate()
+                .map(|(camera_idx, camera)| CameraFacts {
+                    name: camera.name.clone(),
+                    sensor_px: [camera.field.sensor.width, camera.field.sensor.height],
+                    covered_share: camera.coverage.covered_share(),
+                    views: views.iter().filter(|(c, _)| *c == camera_idx).count(),
+                    central: camera.field.is_central(),
+                })
+                .collect(),
+            baseline_mm: (1..cameras.len())
+                .map(|k| (place(k) - place(0)).norm())
+                .collect(),
+            working_distance_mm: working_distance(calibration, &views),
+            poses_used: calibration.poses.len(),
+            views_used: views.len(),
+            left_out: calibration.left_out.len(),
+            corners_used: calibration.estimate.corners_used,
+            corners_rejected: calibration.estimate.corners_rejected,
+        }
+    }
+}
+
+/// From each camera to the middle of each board it saw.
+fn working_distance(calibration: &Calibration, views: &BTreeSet<(usize, usize)>) -> Option<Spread> {
+    let center_in_board = calibration.board.center_in_board();
+    let mut distances: Vec<f64> = calibration
+        .poses
+        .iter()
+        .flat_map(|pose| {
+            let center_in_rig = pose.rig_from_board.point(&center_in_board);
+            calibration
+                .rig
+                .cameras
+                .iter()
+                .enumerate()
+                .filter(|(camera_idx, _)| views.contains(&(*camera_idx, pose.pose)))
+                .map(move |(_, camera)| {
+                    (center_in_rig - camera.rig_from_camera.translation_mm).norm()
+                })
+        })
+        .collect();
+    distances.sort_by(f64::total_cmp);
+    Some(Spread {
+        least: *distances.first()?,
+        median: *distances.get(distances.len() / 2)?,
+        most: *distances.last()?,
+    })
+}
+
+impl Grade {
+    /// The grade as a word.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Pass => "pass",
+            Self::Doubtful => "doubtful",
+            Self::Fail => "fail",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::example;
+
+    #[test]
+    fn facts_of_the_example_are_those_it_was_made_with() {
+        let facts = Facts::of(&example::calibration());
+        assert!((facts.baseline_mm[0] - 200.0).abs() < 1e-9);
+        assert_eq!(facts.poses_used, 33);
+        // One view is missing.
+        assert_eq!(facts.views_used, 65);
+        assert_eq!(facts.cameras[1].views, 32);
+        // 0.152 % of 10 mm.
+        assert!((facts.held_out_neighbor_mm.unwrap() - 0.0152).abs() < 1e-12);
+        // 410 mm straight ahead and 100 mm aside, give or take the stage's radius.
+        let distance = facts.working_distance_mm.unwrap();
+        assert!((distance.median - 422.0).abs() < 15.0, "{distance:?}");
+        assert!(distance.least <= distance.median && distance.median <= distance.most);
+    }
+}

@@ -1,0 +1,285 @@
+//! The report page: one HTML file that needs nothing else, no network and no scripts.
+
+use super::facts::Facts;
+use super::plot::{Figure, cost, coverage, histogram, pose_rms, residual_vectors, scene};
+use super::record::Calibration;
+use super::text::short;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use serde::Serialize;
+
+/// What is known of the blob that was written beside the report.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct BlobFacts {
+    /// Its size.
+    pub bytes: usize,
+    /// Largest difference of a ray from the calibration's, px.
+    pub max_error_px: f64,
+}
+
+impl BlobFacts {
+    /// Size and error with their units.
+    pub fn in_words(&self) -> String {
+        format!(
+            "{} bytes ({} kB), within {} px of the calibration",
+            self.bytes,
+            short(self.bytes as f64 / 1000.0),
+            short(self.max_error_px)
+        )
+    }
+}
+
+/// The page as a file's content.
+pub fn page(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
+    let facts = Facts::of(calibration);
+    let names: Vec<&str> = facts.cameras.iter().map(|c| c.name.as_str()).collect();
+    let title = format!("Calibration of {}", names.join(" and "));
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                meta name="generator" content={ "calib-offline " (calibration.tool_version) };
+                title { (title) }
+                style { (PreEscaped(include_str!("page.css"))) }
+            }
+            body {
+                main {
+                    h1 { (title) }
+                    (verdict(&facts))
+                    (headline(calibration, &facts, blob))
+                    (figures(calibration))
+                    (left_out(calibration))
+                    (provenance(calibration))
+                }
+            }
+        }
+    }
+    .into_string()
+}
+
+fn verdict(facts: &Facts) -> Markup {
+    html! {
+        section class={ "verdict " (facts.verdict.word()) } {
+            p.grade { "Verdict: " strong { (facts.verdict.word()) } }
+            @if !facts.reasons.is_empty() {
+                ul { @for reason in &facts.reasons { li { (reason) } } }
+            }
+        }
+    }
+}
+
+/// One number with its name, unit and what it means.
+fn card(name: &str, value: &str, note: &str) -> Markup {
+    html! {
+        div.card {
+            p.name { (name) }
+            p.value { (value) }
+            @if !note.is_empty() { p.note { (note) } }
+        }
+    }
+}
+
+fn headline(calibration: &Calibration, facts: &Facts, blob: Option<&BlobFacts>) -> Markup {
+    let held_out = calibration.held_out.as_ref();
+    let px = |value: f64| format!("{} px", short(value));
+    html! {
+        section.cards {
+            @if let (Some(percent), Some(mm)) = (facts.held_out_neighbor_percent, facts.held_out_neighbor_mm) {
+                (card(
+                    "Held-out length error",
+                    &format!("{} %", short(percent)),
+                    &format!("RMS of neighboring-corner distances: {} mm of {} mm", short(mm), calibration.board.square_mm),
+                ))
+            }
+            @if let Some(mm) = facts.held_out_rigid_mm {
+                (card("Held-out shape error", &format!("{} mm", short(mm)), "RMS distance of triangulated corners from the rigid board"))
+            }
+            @if let Some(value) = facts.held_out_rms_px {
+                (card("Held-out residual", &px(value), "RMS residual vector, board pose refitted"))
+            }
+            @if let Some(held_out) = held_out {
+                (card("Held-out check", &format!("{} folds", held_out.folds), &format!("by pose; {} points, {} outside the calibrated area", held_out.point_count, held_out.outside_count)))
+            } @else {
+                (card("Held-out check", "none", "too few poses to leave some out"))
+            }
+            (card("Corner noise", &px(facts.sigma_px), "standard deviation per axis, robust estimate"))
+            (card("Residual", &px(facts.rms_px), &format!("RMS residual vector of the {} corners used", facts.corners_used)))
+            @for (camera, baseline_mm) in facts.cameras.iter().skip(1).zip(&facts.baseline_mm) {
+                (card("Baseline", &format!("{baseline_mm:.2} mm"), &format!("{} to {}: check it with a ruler", facts.cameras[0].name, camera.name)))
+            }
+            @if let Some(distance) = facts.working_distance_mm {
+                (card("Working distance", &format!("{:.0} mm", distance.median), &format!("camera to board, {:.0} to {:.0} mm", distance.least, distance.most)))
+            }
+            (card("Images", &facts.views_used.to_string(), &format!("of {} poses; {} left out", facts.poses_used, facts.left_out)))
+            (card("Rejected corners", &facts.corners_rejected.to_string(), &share_rejected(facts)))
+            @for camera in &facts.cameras {
+                (card(
+                    &format!("Camera {}", camera.name),
+                    &format!("{:.0} %", 100.0 * camera.covered_share),
+                    &format!("of {} x {} px calibrated, {} images{}", camera.sensor_px[0], camera.sensor_px[1], camera.views, if camera.central { "" } else { ", non-central" }),
+                ))
+            }
+            @if let Some(blob) = blob {
+                (card("Blob", &format!("{} kB", short(blob.bytes as f64 / 1000.0)), &format!("{} bytes, within {} px of the calibration", blob.bytes, short(blob.max_error_px))))
+            }
+        }
+    }
+}
+
+fn share_rejected(facts: &Facts) -> String {
+    let offered = facts.corners_used + facts.corners_rejected;
+    if offered == 0 {
+        return String::new();
+    }
+    let percent = 100.0 * facts.corners_rejected as f64 / offered as f64;
+    format!("{} % of {offered}", short(percent))
+}
+
+fn figures(calibration: &Calibration) -> Markup {
+    html! {
+        (group("Coverage", &coverage::draw(calibration),
+            "Each dot is a corner. Shaded parts of the sensor are not calibrated: a pixel there gets no ray. Good: dots everywhere, to the edges. To enlarge the calibrated area, record poses with the board over the shaded parts."))
+        (group("Residual vectors", &residual_vectors::draw(calibration),
+            "Each line is what the model did not explain at one corner, colored by its direction. Good: short lines in mixed colors. Bad: neighbors with one color, which is a pattern that noise does not make: a lens the model cannot follow, a bent board, or something that moved between the cameras."))
+        (group("Distribution", histogram::draw(calibration).as_slice(),
+            "Bars are the residuals, the line is Gaussian noise of the size found. Good: bars under the line and centered on zero. Long tails are poor corners; a shifted or doubled peak is a mistake in the data."))
+        (group("Poses", pose_rms::draw(calibration).as_slice(),
+            "Good: all bars near the upright line. A pose that stands out was blurred, moved or mislabeled: look at its images, and leave it out with --exclude. If one camera is longer throughout, look at its focus."))
+        (group("Cameras and boards", &scene::draw(calibration),
+            "Good: the distances are those of the real set-up, and every board lies before the cameras. Boards that fill the space you measure in, at several tilts, determine the rays best."))
+        (group("Convergence", cost::draw(calibration).as_slice(),
+            "Good: falls quickly and ends flat. A curve that still falls at its end was stopped too early."))
+    }
+}
+
+fn group(title: &str, figures: &[Figure], how_to_read: &str) -> Markup {
+    html! {
+        @if !figures.is_empty() {
+            section {
+                h2 { (title) }
+                p.read { strong { "How to read this. " } (how_to_read) }
+                div.figures {
+                    @for figure in figures {
+                        figure {
+                            @if figure.title != title { h3 { (figure.title) } }
+                            (PreEscaped(&figure.svg))
+                            figcaption { (figure.caption) }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn left_out(calibration: &Calibration) -> Markup {
+    html! {
+        section {
+            h2 { "Left out" }
+            @if calibration.left_out.is_empty() {
+                p { "Nothing: every image was used." }
+            } @else {
+                div.scroll {
+                    table {
+                        thead { tr { th { "Pose" } th { "Camera" } th { "Corners" } th { "Reason" } } }
+                        tbody {
+                            @for left in &calibration.left_out {
+                                tr {
+                                    td.number { (left.pose) }
+                                    td { (left.camera.as_deref().unwrap_or("all")) }
+                                    td.number { (left.corner_count) }
+                                    td { (left.reason) }
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn provenance(calibration: &Calibration) -> Markup {
+    let board = &calibration.board;
+    html! {
+        footer {
+            dl {
+                dt { "Program" } dd { "calib-offline " (calibration.tool_version) ", method " (calibration.method) }
+                dt { "Board" } dd { (board.rows) " rows x " (board.cols) " cols of inner corners, " (board.square_mm) " mm" }
+                dt { "Input" } dd { "SHA-256 " code { (calibration.input_sha256) } }
+                dt { "Conventions" } dd { "Millimeters. The center of the top-left pixel is (0, 0), u right, v down. The rig frame is the board at pose " (calibration.rig.datum_pose) "." }
+                dt { "Numbers" } dd { "Everything drawn here stands in calibration.json." }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::example;
+
+    fn blob() -> BlobFacts {
+        BlobFacts {
+            bytes: 48_320,
+            max_error_px: 0.00042,
+        }
+    }
+
+    #[test]
+    fn the_page_stands_alone() {
+        let page = page(&example::calibration(), Some(&blob()));
+        // To look at it: EXAMPLE_REPORT=page.html cargo test the_page_stands_alone
+        if let Some(path) = std::env::var_os("EXAMPLE_REPORT") {
+            std::fs::write(path, &page).unwrap();
+        }
+        for part in [
+            "http:", "https:", "<script", "src=", "href=", "@import", "url(",
+        ] {
+            assert!(!page.contains(part), "{part} in the page");
+        }
+        assert!(!page.contains("NaN"));
+        for part in [
+            "doubtful",
+            "limit 85 %",
+            "0.152 %",
+            "0.0113 mm",
+            "0.0741 px",
+            "200.00 mm",
+            "48320 bytes",
+            "excluded by the user",
+            &"9f2c4e".repeat(3),
+        ] {
+            assert!(page.contains(part), "{part} is not in the page");
+        }
+        assert_eq!(page.matches("<svg").count(), 9);
+        assert_eq!(page.matches("How to read this").count(), 6);
+    }
+
+    #[test]
+    fn names_and_reasons_cannot_break_the_page() {
+        let mut calibration = example::calibration();
+        calibration.rig.cameras[0].name = "<b>&".to_owned();
+        calibration.left_out[0].reason = "<script>".to_owned();
+        let page = page(&calibration, None);
+        assert!(!page.contains("<b>&"));
+        assert!(!page.contains("<script>"));
+    }
+
+    #[test]
+    fn a_bare_calibration_gives_a_page_too() {
+        let mut calibration = example::calibration();
+        calibration.rig.cameras.truncate(1);
+        calibration.corners.clear();
+        calibration.poses.clear();
+        calibration.left_out.clear();
+        calibration.held_out = None;
+        calibration.estimate.cost_per_iteration.clear();
+        calibration.estimate.sigma_px = f64::NAN;
+        let page = page(&calibration, None);
+        assert!(page.contains("too few poses"));
+        assert!(page.contains("every image was used"));
+    }
+}

@@ -1,0 +1,173 @@
+//! The summary for a terminal: what stands on the page's first screen.
+
+use super::facts::Facts;
+use super::html::BlobFacts;
+use super::record::Calibration;
+use std::fmt::Write as _;
+
+/// A few lines, each with one fact and its unit; no colors.
+pub fn summary(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
+    let facts = Facts::of(calibration);
+    let mut lines: Vec<(&str, String)> = vec![("verdict", facts.verdict.word().to_owned())];
+    lines.extend(facts.reasons.iter().map(|reason| ("", reason.clone())));
+    lines.push(("held-out error", held_out(calibration, &facts)));
+    lines.push((
+        "corner noise",
+        format!(
+            "{} px per axis, residual vectors {} px RMS over {} corners ({} rejected)",
+            short(facts.sigma_px),
+            short(facts.rms_px),
+            facts.corners_used,
+            facts.corners_rejected
+        ),
+    ));
+    for camera in &facts.cameras {
+        let [width, height] = camera.sensor_px;
+        lines.push((
+            "camera",
+            format!(
+                "{}, {width} x {height} px, {} images, {:.0} % of the sensor calibrated{}",
+                camera.name,
+                camera.views,
+                100.0 * camera.covered_share,
+                if camera.central { "" } else { ", non-central" }
+            ),
+        ));
+    }
+    for (camera, baseline_mm) in facts.cameras.iter().skip(1).zip(&facts.baseline_mm) {
+        lines.push((
+            "baseline",
+            format!(
+                "{baseline_mm:.2} mm from {} to {}",
+                facts.cameras[0].name, camera.name
+            ),
+        ));
+    }
+    if let Some(distance) = facts.working_distance_mm {
+        lines.push((
+            "distance",
+            format!(
+                "{:.0} mm from camera to board ({:.0} to {:.0})",
+                distance.median, distance.least, distance.most
+            ),
+        ));
+    }
+    lines.push((
+        "images",
+        format!(
+            "{} poses, {} images used; {} left out",
+            facts.poses_used, facts.views_used, facts.left_out
+        ),
+    ));
+    for left in &calibration.left_out {
+        lines.push((
+            "",
+            format!(
+                "pose {}{}: {}",
+                left.pose,
+                left.camera
+                    .as_ref()
+                    .map_or(String::new(), |c| format!(", {c}")),
+                left.reason
+            ),
+        ));
+    }
+    if let Some(blob) = blob {
+        lines.push(("blob", blob.in_words()));
+    }
+    lines.iter().fold(String::new(), |mut text, (name, fact)| {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{name:<15} {fact}");
+        text
+    })
+}
+
+fn held_out(calibration: &Calibration, facts: &Facts) -> String {
+    let Some(held_out) = &calibration.held_out else {
+        return "not checked: too few poses to leave some out".to_owned();
+    };
+    let mut parts = Vec::new();
+    if let (Some(percent), Some(mm)) = (facts.held_out_neighbor_percent, facts.held_out_neighbor_mm)
+    {
+        parts.push(format!(
+            "{} % of the square between neighboring corners ({} mm of {} mm)",
+            short(percent),
+            short(mm),
+            calibration.board.square_mm
+        ));
+    }
+    if let Some(mm) = facts.held_out_rigid_mm {
+        parts.push(format!("{} mm from the rigid board", short(mm)));
+    }
+    if let Some(px) = facts.held_out_rms_px {
+        parts.push(format!("{} px", short(px)));
+    }
+    if parts.is_empty() {
+        return format!("nothing could be measured in {} folds", held_out.folds);
+    }
+    format!(
+        "{} (RMS, {} folds by pose)",
+        parts.join(", "),
+        held_out.folds
+    )
+}
+
+/// Three significant digits without an exponent where that stays short.
+pub fn short(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let magnitude = value.abs().log10().floor() as i32;
+    if (-4..6).contains(&magnitude) {
+        let decimals = (2 - magnitude).max(0) as usize;
+        format!("{value:.decimals$}")
+    } else {
+        format!("{value:.2e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::example;
+
+    #[test]
+    fn three_digits_are_shown_at_any_size() {
+        let cases = [
+            (0.0, "0"),
+            (0.05, "0.0500"),
+            (1.2345, "1.23"),
+            (123.456, "123"),
+            (98765.4, "98765"),
+            (0.00012345, "0.000123"),
+            (1.5e-9, "1.50e-9"),
+            (2.5e9, "2.50e9"),
+            (f64::NAN, "NaN"),
+        ];
+        for (value, expected) in cases {
+            assert_eq!(short(value), expected);
+        }
+    }
+
+    #[test]
+    fn the_summary_has_every_fact_with_its_unit() {
+        let mut calibration = example::calibration();
+        let text = summary(&calibration, None);
+        for part in [
+            "verdict         doubtful",
+            "limit 85 %",
+            "0.152 % of the square",
+            "0.0152 mm of 10 mm",
+            "0.0113 mm from the rigid board",
+            "0.0741 px",
+            "200.00 mm from left to right",
+            "33 poses, 65 images used; 2 left out",
+            "pose 30, right: no board found",
+            "0.0500 px per axis",
+        ] {
+            assert!(text.contains(part), "{part:?} is not in:\n{text}");
+        }
+        calibration.held_out = None;
+        assert!(summary(&calibration, None).contains("not checked"));
+    }
+}
