@@ -2,6 +2,8 @@
 
 pub mod board;
 pub mod dataset;
+pub mod detect;
 pub mod field;
 pub mod geometry;
+pub mod progress;
 pub mod report;

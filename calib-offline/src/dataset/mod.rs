@@ -1,5 +1,7 @@
 //! What a user records: a folder with `dataset.toml` and images or corners, or both.
 
+pub mod image;
+
 use crate::board::BoardSpec;
 use crate::geometry::{PixelPoint, SensorSize};
 use std::collections::BTreeSet;
