@@ -2,6 +2,10 @@
 
 use crate::atomic_file::WriteError;
 use crate::dataset::{CornersError, ManifestError, SufficiencyError};
+use crate::detect::DetectError;
+use crate::init::InitError;
+use crate::joint::EstimateError;
+use crate::simulate::SimulateError;
 use crate::matches::MatchesError;
 use crate::pack::PackError;
 use crate::report::store::CalibrationError;
@@ -20,6 +24,18 @@ pub enum Error {
     /// Corners that no estimate could work with.
     #[error("these corners cannot determine a calibration")]
     Sufficiency(#[from] SufficiencyError),
+    /// Images whose boards cannot be numbered alike.
+    #[error("the images cannot be used")]
+    Detect(#[from] DetectError),
+    /// No starting point.
+    #[error("no camera model explains these corners")]
+    Init(#[from] InitError),
+    /// No estimate.
+    #[error("the estimate failed")]
+    Estimate(#[from] EstimateError),
+    /// A simulation that cannot be made.
+    #[error("the simulation cannot be made")]
+    Simulate(#[from] SimulateError),
     /// A calibration that was read.
     #[error("the calibration cannot be used")]
     Calibration(#[from] CalibrationError),
@@ -164,9 +180,15 @@ impl Error {
     /// The process's exit code: 3 where the data cannot determine the answer, else 2.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Sufficiency(_) | Self::Pack(PackError::NothingCalibrated { .. }) => 3,
+            Self::Sufficiency(_)
+            | Self::Detect(DetectError::Consistency(_))
+            | Self::Init(_)
+            | Self::Estimate(_)
+            | Self::Pack(PackError::NothingCalibrated { .. }) => 3,
             Self::Manifest(_)
             | Self::Corners(_)
+            | Self::Detect(_)
+            | Self::Simulate(_)
             | Self::Calibration(_)
             | Self::Blob(_)
             | Self::Matches(_)
@@ -183,11 +205,17 @@ impl Error {
             Self::Manifest(error) => error.remedy(),
             Self::Corners(error) => error.remedy(),
             Self::Sufficiency(error) => error.remedy(),
+            Self::Detect(_) | Self::Simulate(_) | Self::Json(_) => None,
+            Self::Init(_) | Self::Estimate(_) => Some(
+                "look at the corners with calib-offline inspect, and at the images with detect \
+                 --overlay; check rows, cols and the image size in dataset.toml, and record the \
+                 board at more tilts and distances"
+                    .to_owned(),
+            ),
             Self::Calibration(error) => error.remedy(),
             Self::Blob(error) => error.remedy(),
             Self::Matches(error) => error.remedy(),
             Self::Pack(error) => pack_remedy(error),
-            Self::Json(_) => None,
             Self::Write(error) => error.remedy(),
             Self::Usage(error) => error.remedy(),
         }

@@ -11,20 +11,40 @@ use crate::dataset::split::without_excluded;
 use crate::dataset::sufficiency::check_sufficiency;
 use crate::dataset::{Dataset, View};
 use crate::detect::{self, DetectSettings};
-use crate::error::Error;
+use crate::error::{Error, UsageError};
 use crate::evaluate::held_out::{HeldOut, held_out};
 use crate::evaluate::verdict::Thresholds;
 use crate::init::rig::start_rig;
 use crate::joint::estimate;
 use crate::progress::Progress;
 use crate::report::Calibration;
-use std::collections::BTreeSet;
+use clap::ValueEnum;
 
-/// How to calibrate. Nothing here needs to be chosen by the user.
+/// Which estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Method {
+    /// All cameras and poses together.
+    Joint,
+    /// The published procedure.
+    Alternating,
+}
+
+impl Method {
+    /// The name in files and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Joint => "joint",
+            Self::Alternating => "alternating",
+        }
+    }
+}
+
+/// How to calibrate. Nothing here needs to be chosen by the user. Poses are left out by the
+/// dataset's own list.
 #[derive(Debug, Clone)]
 pub struct CalibrateSettings {
-    /// Poses left out besides those of the manifest.
-    pub exclude: BTreeSet<usize>,
+    /// Which estimate.
+    pub method: Method,
     /// Folds of the held-out check; 0 leaves it out.
     pub folds: usize,
     /// What counts as good.
@@ -36,7 +56,7 @@ pub struct CalibrateSettings {
 impl Default for CalibrateSettings {
     fn default() -> Self {
         Self {
-            exclude: BTreeSet::new(),
+            method: Method::Joint,
             folds: 5,
             thresholds: Thresholds::default(),
             detect: DetectSettings::default(),
@@ -45,7 +65,7 @@ impl Default for CalibrateSettings {
 }
 
 /// Corners of a dataset, and where they come from.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Corners {
     /// The views.
     pub views: Vec<View>,
@@ -101,8 +121,12 @@ pub fn calibrate_corners(
     settings: &CalibrateSettings,
     progress: &dyn Progress,
 ) -> Result<Calibration, Error> {
-    let excluded = &dataset.excluded_poses | &settings.exclude;
-    let selection = without_excluded(corners.views.clone(), &excluded);
+    if settings.method != Method::Joint {
+        return Err(Error::Usage(UsageError::NoSuchMethod {
+            method: settings.method.name(),
+        }));
+    }
+    let selection = without_excluded(corners.views.clone(), &dataset.excluded_poses);
     check_sufficiency(dataset, &selection.used)?;
     let sensors = dataset.cameras.iter().map(|camera| camera.sensor).collect();
     let observations = Observations::new(dataset.board, sensors, &selection.used);
@@ -126,7 +150,6 @@ pub fn calibrate_corners(
     Ok(summary::record(&summary::Parts {
         dataset,
         corners,
-        excluded: &excluded,
         observations: &observations,
         estimate: &estimate,
         held_out: &unseen,

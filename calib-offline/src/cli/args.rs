@@ -1,6 +1,6 @@
 //! What can be written on the command line. Each help text starts with an example.
 
-use super::{calibrate, demo, inspect, measure, pack};
+use super::{calibrate, demo, inspect, measure, pack, simulate};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::num::NonZeroUsize;
 
@@ -45,6 +45,8 @@ pub enum Verb {
     Measure(measure::MeasureArgs),
     /// Pack a calibration for the device within a proven error
     Pack(pack::PackArgs),
+    /// Simulate a recording whose truth is known
+    Simulate(simulate::SimulateArgs),
 }
 
 /// What holds for every verb.

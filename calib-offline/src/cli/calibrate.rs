@@ -106,7 +106,7 @@ pub fn run(
     dataset.excluded_poses.extend(&args.exclude);
     let settings = CalibrateSettings {
         method: args.method,
-        seed: args.seed,
+        ..CalibrateSettings::default()
     };
     let written = calibrate_into(&args.output, &dataset, &settings, console, estimate)?;
     let [calibration, rig, report] = &written.files;

@@ -6,7 +6,7 @@ use super::output::Console;
 use crate::atomic_file::check_folder;
 use crate::dataset::Dataset;
 use crate::error::{Error, UsageError};
-use crate::pipeline::{CalibrateSettings, Method};
+use crate::pipeline::CalibrateSettings;
 use crate::report::facts::Facts;
 use crate::report::record::Grade;
 use crate::report::text;
@@ -56,10 +56,7 @@ struct DatasetObject {
 pub fn run(args: &DemoArgs, console: &Console, estimate: Estimate<'_>) -> Result<Outcome, Error> {
     check_folder(&args.output)?;
     let data = data_folder(args.data.as_deref())?;
-    let settings = CalibrateSettings {
-        method: Method::Joint,
-        seed: 1,
-    };
+    let settings = CalibrateSettings::default();
     let (mut words, mut datasets) = (String::new(), Vec::new());
     for name in DATASETS {
         let folder = data.join(name);

@@ -15,6 +15,7 @@ pub mod place;
 pub mod progress;
 mod rig_file;
 pub mod settings;
+pub mod simulate;
 
 use crate::error::Error;
 use args::{Cli, Verb};
@@ -59,5 +60,6 @@ fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
         Verb::Inspect(args) => inspect::run(args, console),
         Verb::Measure(args) => measure::run(args, console),
         Verb::Pack(args) => pack::run(args, console),
+        Verb::Simulate(args) => simulate::run(args, console),
     }
 }

@@ -1,5 +1,8 @@
 //! `calib-offline simulate`: a dataset with known truth.
 
+use super::Outcome;
+use super::output::Console;
+use crate::error::Error;
 use crate::geometry::SensorSize;
 use crate::simulate::output::write_dataset;
 use crate::simulate::{
@@ -7,6 +10,7 @@ use crate::simulate::{
 };
 pub use crate::simulate::{SimulateError, SimulateSummary};
 use clap::{Args, ValueEnum};
+use serde::Serialize;
 use std::path::PathBuf;
 
 /// Example: `calib-offline simulate -o port --optics port --seed 7`
@@ -107,12 +111,52 @@ pub enum TargetKind {
     Ring,
 }
 
+/// Runs the command.
+///
+/// # Errors
+/// [`Error::Simulate`], with nothing written.
+pub fn run(args: &SimulateArgs, console: &Console) -> Result<Outcome, Error> {
+    let summary = simulate(args)?;
+    let words = format!(
+        "{}: {} cameras, {} poses, {} corners, {} images of the board\n\
+         a perfect calibration has {:.4} mm RMS on matches.csv ({} points) and {:.4} mm on \
+         holdout.csv ({})\n",
+        summary.folder.display(),
+        summary.camera_count,
+        summary.pose_count,
+        summary.corner_count,
+        summary.image_count,
+        summary.points_oracle_rms_mm,
+        summary.point_count,
+        summary.holdout_oracle_rms_mm,
+        summary.holdout_count,
+    );
+    let object = SimulateObject {
+        schema: "calib-offline/simulate/1",
+        summary: &summary,
+    };
+    console.result(&words, &object);
+    console.narrate(&format!(
+        "next: calib-offline calibrate {} -o RESULTS",
+        summary.folder.display()
+    ));
+    Ok(Outcome::Done)
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct SimulateObject<'a> {
+    schema: &'static str,
+    #[serde(flatten)]
+    summary: &'a SimulateSummary,
+}
+
 /// Simulates and writes the dataset.
 ///
 /// # Errors
 /// As [`write_dataset`], and [`SimulateError::Argument`] or [`SimulateError::Scene`] if an option
 /// makes no sense.
-pub fn run(args: &SimulateArgs) -> Result<SimulateSummary, SimulateError> {
+pub fn simulate(args: &SimulateArgs) -> Result<SimulateSummary, SimulateError> {
     let scene = Scene::new(scene_settings(args)?)?;
     write_dataset(&scene, &output_settings(args)?, &args.output, args.force)
 }

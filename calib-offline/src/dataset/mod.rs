@@ -2,6 +2,7 @@
 
 pub mod corners;
 pub mod identity;
+pub mod image;
 pub mod images;
 pub mod manifest;
 pub mod split;

@@ -4,15 +4,16 @@ use super::Corners;
 use crate::adjust::Observations;
 use crate::dataset::identity::input_sha256;
 use crate::dataset::{Dataset, stage};
+use crate::detect::verdict::Outcome;
+use crate::evaluate::fit_stage_axes;
 use crate::evaluate::HeldOut;
 use crate::evaluate::verdict::{Figures, Thresholds, judge};
 use crate::adjust::StopReason;
 use crate::joint::Estimate;
 use crate::report::record::{
-    Calibration, CornerRecord, EstimateRecord, HeldOutRecord, LeftOut, PoseRecord, SCHEMA,
+    Calibration, CornerRecord, EstimateRecord, HeldOutRecord, LeftOut, PoseRecord, SCHEMA, StageAxis,
 };
 use nalgebra::Vector2;
-use std::collections::BTreeSet;
 
 /// Results of all steps.
 pub struct Parts<'a> {
@@ -20,8 +21,6 @@ pub struct Parts<'a> {
     pub dataset: &'a Dataset,
     /// All corners, excluded poses included.
     pub corners: &'a Corners,
-    /// Poses that the user left out.
-    pub excluded: &'a BTreeSet<usize>,
     /// What was offered to the estimate.
     pub observations: &'a Observations,
     /// What it made of it.
@@ -38,6 +37,7 @@ pub fn record(parts: &Parts) -> Calibration {
     let estimate = parts.estimate;
     let rig = estimate.rig(&names);
     let corners = corner_records(estimate);
+    let poses = pose_records(parts, rig.cameras.len());
     let summary = estimate_record(estimate, &corners);
     let held_out = held_out_record(parts.held_out);
     let verdict = judge(
@@ -67,7 +67,8 @@ pub fn record(parts: &Parts) -> Calibration {
         input_sha256: input_sha256(parts.dataset, &parts.corners.views),
         board: parts.dataset.board,
         board_shape: estimate.model.board_shape.clone(),
-        poses: pose_records(parts, rig.cameras.len()),
+        stage_axes: stage_axes(parts, &poses),
+        poses,
         rig,
         corners,
         left_out: left_out(parts, &names),
@@ -170,10 +171,17 @@ fn pose_records(parts: &Parts, camera_count: usize) -> Vec<PoseRecord> {
         .collect()
 }
 
+fn stage_axes(parts: &Parts, poses: &[PoseRecord]) -> Vec<StageAxis> {
+    let all_poses = crate::dataset::corners::poses(&parts.corners.views);
+    fit_stage_axes(poses, |pose| {
+        stage::entry(parts.dataset, &all_poses, pose).placement
+    })
+}
+
 /// Poses, views and corners that did not go in.
 fn left_out(parts: &Parts, names: &[String]) -> Vec<LeftOut> {
     let mut list: Vec<LeftOut> = Vec::new();
-    for pose in parts.excluded {
+    for pose in &parts.dataset.excluded_poses {
         let corner_count = parts
             .corners
             .views
@@ -223,12 +231,12 @@ fn left_out(parts: &Parts, names: &[String]) -> Vec<LeftOut> {
         }
     }
     for image in parts.corners.detection.iter().flat_map(|d| &d.images) {
-        if let Some(reason) = image.refusal() {
+        if let Outcome::Refused(refusal) = &image.outcome {
             list.push(LeftOut {
                 pose: image.pose,
                 camera: Some(names[image.camera_idx].clone()),
                 corner_count: 0,
-                reason,
+                reason: refusal.to_string(),
             });
         }
     }
