@@ -6,6 +6,7 @@
 //! compared with the f64 field ([`proof`]). The largest difference is written into the blob.
 
 mod aligned_bytes;
+mod banded;
 mod budget;
 mod encode;
 mod field_rows;
