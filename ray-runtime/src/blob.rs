@@ -1,11 +1,14 @@
 //! A blob opened in place: everything is checked once, nothing is copied.
 
 use crate::camera::Camera;
+use crate::check::{
+    check_padding, check_self_tests, checked_header, is_moderate, is_region_on_sensor, is_rotation,
+    recognized_header, same_bits,
+};
 use crate::error::Table;
 use crate::format::{
-    self, ALIGNMENT, Axis, CameraMeta, Encoding, HEADER_LEN, Header, IDENTITY_LEN, MAGIC,
-    MAX_CAMERAS, MAX_CELLS, MAX_EXTENT_PX, MAX_MAGNITUDE, Meta, RECORD_LEN, RECORD_WORDS, Record,
-    SelfTest, VERSION,
+    self, ALIGNMENT, Axis, CameraMeta, Encoding, HEADER_LEN, IDENTITY_LEN, MAX_CELLS, Meta,
+    RECORD_LEN, RECORD_WORDS, Record,
 };
 use crate::self_test::SelfTests;
 use crate::triangulate::{self, Triangulation};
@@ -311,118 +314,4 @@ impl<'a> RayBlob<'a> {
         check_padding(self.bytes, mask_end, end)?;
         Ok(end)
     }
-}
-
-/// The header, if magic and version are right.
-fn recognized_header(bytes: &[u8]) -> Result<Header, OpenError> {
-    let (magic, header) = Header::read(bytes).ok_or(OpenError::Truncated {
-        need: HEADER_LEN as u32,
-        have: bytes.len() as u32,
-    })?;
-    if magic != MAGIC {
-        return Err(OpenError::BadMagic {
-            found: u32::from_le_bytes(magic),
-        });
-    }
-    if header.version != VERSION {
-        return Err(OpenError::WrongVersion {
-            found: header.version,
-            supported: VERSION,
-        });
-    }
-    Ok(header)
-}
-
-/// The header of bytes that have the length and the checksum it states.
-fn checked_header(bytes: &[u8]) -> Result<Header, OpenError> {
-    let header = recognized_header(bytes)?;
-    let (need, have) = (
-        header.total_len,
-        u32::try_from(bytes.len()).unwrap_or(u32::MAX),
-    );
-    if have < need {
-        return Err(OpenError::Truncated { need, have });
-    }
-    if have > need {
-        return Err(OpenError::TrailingBytes { need, have });
-    }
-    let computed = format::checksum(bytes).ok_or(OpenError::BadHeader)?;
-    if computed != header.crc {
-        return Err(OpenError::BadCrc {
-            stated: header.crc,
-            computed,
-        });
-    }
-    let reserved = bytes.get(HEADER_LEN - 2..HEADER_LEN);
-    if usize::from(header.header_len) != HEADER_LEN
-        || reserved != Some(&[0, 0])
-        || !bytes.len().is_multiple_of(ALIGNMENT)
-        || !(1..=MAX_CAMERAS).contains(&header.camera_count)
-    {
-        return Err(OpenError::BadHeader);
-    }
-    Ok(header)
-}
-
-fn check_padding(bytes: &[u8], start: usize, end: usize) -> Result<(), OpenError> {
-    bytes
-        .get(start..end)
-        .filter(|padding| padding.iter().all(|byte| *byte == 0))
-        .map(|_| ())
-        .ok_or(OpenError::BadPadding { at: start as u32 })
-}
-
-/// Checks that there are as many self-tests as stated, of cameras that exist, and nothing else.
-fn check_self_tests(bytes: &[u8], count: u16, camera_count: u16) -> Result<(), OpenError> {
-    let mut rest = bytes;
-    for _ in 0..count {
-        let (test, after) =
-            postcard::take_from_bytes::<SelfTest>(rest).map_err(|_| OpenError::BadMeta)?;
-        rest = after;
-        let has_cameras = match test {
-            SelfTest::Ray { camera, .. } => camera < camera_count,
-            SelfTest::Pair { cameras, .. } => cameras.iter().all(|c| *c < camera_count),
-        };
-        if !has_cameras {
-            return Err(OpenError::BadMeta);
-        }
-    }
-    if rest.is_empty() {
-        Ok(())
-    } else {
-        Err(OpenError::BadMeta)
-    }
-}
-
-fn is_region_on_sensor(meta: &CameraMeta<'_>) -> bool {
-    let fits = |first: u32, extent: u32, sensor: u32| {
-        sensor <= MAX_EXTENT_PX && extent >= 1 && first <= sensor && extent <= sensor - first
-    };
-    fits(meta.region_u, meta.region_width, meta.sensor_width)
-        && fits(meta.region_v, meta.region_height, meta.sensor_height)
-}
-
-fn is_moderate(x: f32) -> bool {
-    // NaN is in no range.
-    (-MAX_MAGNITUDE..=MAX_MAGNITUDE).contains(&x)
-}
-
-fn same_bits(a: Axis, b: Axis) -> bool {
-    let (a, b) = (a.to_numbers(), b.to_numbers());
-    a.iter().zip(&b).all(|(a, b)| a.to_bits() == b.to_bits())
-}
-
-/// Whether the rows are orthonormal and right-handed to within the round-off of f32 entries.
-fn is_rotation([a, b, c, d, e, f, g, h, i]: [f32; 9]) -> bool {
-    const TOLERANCE: f32 = 1e-5;
-    let [x, y, z] = [[a, b, c], [d, e, f], [g, h, i]].map(nalgebra::Vector3::from);
-    // NaN is near nothing.
-    let is_near = |value: f32, goal: f32| (goal - TOLERANCE..=goal + TOLERANCE).contains(&value);
-    is_near(x.norm_squared(), 1.0)
-        && is_near(y.norm_squared(), 1.0)
-        && is_near(z.norm_squared(), 1.0)
-        && is_near(x.dot(&y), 0.0)
-        && is_near(y.dot(&z), 0.0)
-        && is_near(z.dot(&x), 0.0)
-        && is_near(x.cross(&y).dot(&z), 1.0)
 }

@@ -8,6 +8,7 @@ compile_error!("a blob is read in place and holds little-endian numbers");
 mod aligned;
 mod blob;
 mod camera;
+mod check;
 mod error;
 pub mod format;
 mod grid;

@@ -1,6 +1,7 @@
 //! One control grid per camera: the field resampled by least squares.
 
 use super::PackError;
+use super::banded::BandedSystem;
 use super::field_rows::FieldRows;
 use crate::field::CalibratedCamera;
 use crate::field::spline::{AxisWeights, SplineGrid};
@@ -83,7 +84,8 @@ pub fn fit(camera: &CalibratedCamera, cells: [u32; 2]) -> Result<ControlGrid, Pa
                 let m = sample.m_mm / (1.0 + length_squared / 4.0);
                 let s = turn.applied(&sample.s);
                 let value = [s.x, s.y, m.x, m.y];
-                system.add_point(&order, weights_u, &weights_v, weight, value);
+                let terms = knots_that_matter(&order, weights_u, &weights_v);
+                system.add_square(&terms, value, weight);
             }
         }
     }
@@ -217,131 +219,19 @@ impl KnotOrder {
     }
 }
 
-/// Symmetric banded normal equations with four right-hand sides.
-struct BandedSystem {
-    half_bandwidth: usize,
-    /// Row k holds the entries of columns `k - half_bandwidth ..= k`.
-    lower: Vec<f64>,
-    right: Vec<[f64; 4]>,
-}
-
-impl BandedSystem {
-    fn new(size: usize, half_bandwidth: usize) -> Self {
-        Self {
-            half_bandwidth,
-            lower: vec![0.0; size * (half_bandwidth + 1)],
-            right: vec![[0.0; 4]; size],
-        }
-    }
-
-    /// Adds to the entry (row, column), or to its mirror image.
-    fn add(&mut self, a: usize, b: usize, value: f64) {
-        let (row, column) = (a.max(b), a.min(b));
-        let width = self.half_bandwidth + 1;
-        self.lower[row * width + self.half_bandwidth - (row - column)] += value;
-    }
-
-    /// Adds the square of a weighted sum of knots.
-    fn add_square(&mut self, terms: &[(usize, f64)], weight: f64) {
-        for (k, &(a, wa)) in terms.iter().enumerate() {
-            for &(b, wb) in &terms[..=k] {
-                self.add(a, b, weight * wa * wb);
-            }
-        }
-    }
-
-    fn add_point(
-        &mut self,
-        order: &KnotOrder,
-        weights_u: &AxisWeights,
-        weights_v: &AxisWeights,
-        weight: f64,
-        value: [f64; 4],
-    ) {
-        let mut terms = [(0, 0.0); 16];
-        for j in 0..4 {
-            for i in 0..4 {
-                terms[4 * j + i] = (
-                    order.index(weights_u.first + i, weights_v.first + j),
-                    weights_u.value[i] * weights_v.value[j],
-                );
-            }
-        }
-        self.add_square(&terms, weight);
-        for (knot, knot_weight) in terms {
-            for (sum, channel) in self.right[knot].iter_mut().zip(value) {
-                *sum += weight * knot_weight * channel;
-            }
-        }
-    }
-
-    /// Cholesky factorization and both substitutions; `None` if the matrix is not positive
-    /// definite.
-    fn solve(mut self) -> Option<Vec<[f64; 4]>> {
-        let (p, width) = (self.half_bandwidth, self.half_bandwidth + 1);
-        for row in 0..self.right.len() {
-            let first = row.saturating_sub(p);
-            let (above, this) = self.lower.split_at_mut(row * width);
-            for column in first..row {
-                let other = &above[column * width..(column + 1) * width];
-                // Entries of both rows in the columns first .. column.
-                let count = column - first;
-                let start_this = p - (row - first);
-                let start_other = p - count;
-                let sum: f64 = dot(
-                    &this[start_this..start_this + count],
-                    &other[start_other..start_other + count],
-                );
-                let place = p - (row - column);
-                this[place] = (this[place] - sum) / other[p];
-            }
-            let start = p - (row - first);
-            let pivot = this[p] - dot(&this[start..p], &this[start..p]);
-            if !(pivot > 0.0 && pivot.is_finite()) {
-                return None;
-            }
-            this[p] = pivot.sqrt();
-        }
-        for row in 0..self.right.len() {
-            let entries = &self.lower[row * width..(row + 1) * width];
-            for column in row.saturating_sub(p)..row {
-                let factor = entries[p - (row - column)];
-                for channel in 0..4 {
-                    self.right[row][channel] -= factor * self.right[column][channel];
-                }
-            }
-            self.right[row].iter_mut().for_each(|x| *x /= entries[p]);
-        }
-        for row in (0..self.right.len()).rev() {
-            let entries = &self.lower[row * width..(row + 1) * width];
-            self.right[row].iter_mut().for_each(|x| *x /= entries[p]);
-            for column in row.saturating_sub(p)..row {
-                let factor = entries[p - (row - column)];
-                for channel in 0..4 {
-                    self.right[column][channel] -= factor * self.right[row][channel];
-                }
-            }
-        }
-        Some(self.right)
-    }
-}
-
-/// Dot product in eight running sums, which the compiler keeps in vector registers.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (a_chunks, b_chunks) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = a_chunks
-        .remainder()
-        .iter()
-        .zip(b_chunks.remainder())
-        .map(|(x, y)| x * y)
-        .sum();
-    for (x, y) in a_chunks.zip(b_chunks) {
-        for k in 0..8 {
-            sums[k] += x[k] * y[k];
-        }
-    }
-    sums.iter().sum::<f64>() + rest
+/// The 16 knots around a point and their weights.
+fn knots_that_matter(
+    order: &KnotOrder,
+    weights_u: &AxisWeights,
+    weights_v: &AxisWeights,
+) -> [(usize, f64); 16] {
+    std::array::from_fn(|k| {
+        let (i, j) = (k % 4, k / 4);
+        (
+            order.index(weights_u.first + i, weights_v.first + j),
+            weights_u.value[i] * weights_v.value[j],
+        )
+    })
 }
 
 /// The discrete thin-plate energy of the knots: squared second differences along u and v, twice
@@ -353,11 +243,11 @@ fn add_thin_plate(system: &mut BandedSystem, grid: &SplineGrid, order: &KnotOrde
             let at = |di: usize, dj: usize| order.index(i + di, j + dj);
             if i + 2 < knots_u {
                 let terms = [(at(0, 0), 1.0), (at(1, 0), -2.0), (at(2, 0), 1.0)];
-                system.add_square(&terms, THIN_PLATE_WEIGHT);
+                system.add_square(&terms, [0.0; 4], THIN_PLATE_WEIGHT);
             }
             if j + 2 < knots_v {
                 let terms = [(at(0, 0), 1.0), (at(0, 1), -2.0), (at(0, 2), 1.0)];
-                system.add_square(&terms, THIN_PLATE_WEIGHT);
+                system.add_square(&terms, [0.0; 4], THIN_PLATE_WEIGHT);
             }
             if i + 1 < knots_u && j + 1 < knots_v {
                 let terms = [
@@ -366,7 +256,7 @@ fn add_thin_plate(system: &mut BandedSystem, grid: &SplineGrid, order: &KnotOrde
                     (at(0, 1), -1.0),
                     (at(1, 1), 1.0),
                 ];
-                system.add_square(&terms, 2.0 * THIN_PLATE_WEIGHT);
+                system.add_square(&terms, [0.0; 4], 2.0 * THIN_PLATE_WEIGHT);
             }
         }
     }

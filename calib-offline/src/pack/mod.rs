@@ -6,6 +6,7 @@
 //! compared with the f64 field ([`proof`]). The largest difference is written into the blob.
 
 mod aligned_bytes;
+mod banded;
 mod budget;
 mod encode;
 mod field_rows;
@@ -211,7 +212,7 @@ pub fn pack(rig: &Rig, settings: &PackSettings) -> Result<Packed, PackError> {
         let mut is_proven = true;
         for (idx, camera) in rig.cameras.iter().enumerate() {
             let worst_px = proofs[idx].worst_error_px;
-            if !(worst_px <= settings.max_error_px) {
+            if worst_px > settings.max_error_px {
                 chosen[idx].refine(camera, settings, worst_px)?;
                 is_proven = false;
             }
