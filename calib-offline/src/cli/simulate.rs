@@ -217,3 +217,83 @@ fn parse_angles(text: &str) -> Result<Vec<f64>, SimulateError> {
         _ => Err(wrong()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Command {
+        #[command(flatten)]
+        args: SimulateArgs,
+    }
+
+    fn parse(line: &str) -> SimulateArgs {
+        let words = std::iter::once("simulate").chain(line.split_whitespace());
+        Command::try_parse_from(words).unwrap().args
+    }
+
+    fn refused(line: &str) -> String {
+        let home = tempfile::tempdir().unwrap();
+        let mut args = parse(&format!("-o out {line}"));
+        args.output = home.path().join("out");
+        let message = run(&args).unwrap_err().to_string();
+        assert!(!args.output.exists(), "{line} left something behind");
+        message
+    }
+
+    #[test]
+    fn defaults_are_the_standard_dataset_with_noise() {
+        let settings = scene_settings(&parse("-o x --optics port --seed 7")).unwrap();
+        assert_eq!(settings, SceneSettings::standard_noisy(OpticsKind::Port, 7));
+        let fisheye = scene_settings(&parse("-o x --optics fisheye")).unwrap();
+        assert_eq!((fisheye.placements, fisheye.angles_deg.len()), (5, 9));
+    }
+
+    #[test]
+    fn angles_are_a_range_or_a_list() {
+        assert_eq!(
+            parse_angles("-40:20:40").unwrap(),
+            [-40., -20., 0., 20., 40.]
+        );
+        assert_eq!(parse_angles("10:-4:1").unwrap(), [10.0, 6.0, 2.0]);
+        assert_eq!(parse_angles("0:0.1:0.3").unwrap().len(), 4);
+        assert_eq!(parse_angles("3, -7.5").unwrap(), [3.0, -7.5]);
+        for wrong in [
+            "", "a", "1:2", "0:1:nan", "0:0:5", "0:-1:5", "0:1e-9:1", "1,,2",
+        ] {
+            assert!(parse_angles(wrong).is_err(), "{wrong}");
+        }
+        let settings = scene_settings(&parse("-o x --angles -6:3:6")).unwrap();
+        assert_eq!(settings.angles_deg.len(), 5);
+    }
+
+    #[test]
+    fn senseless_options_are_named_and_leave_nothing_behind() {
+        for (line, named) in [
+            ("--sensor 1280", "--sensor"),
+            ("--sensor 12x-3", "--sensor"),
+            ("--angles 1:2", "--angles"),
+            ("--noise-px nan", "noise_px"),
+            ("--missing 1.2", "missing share"),
+            ("--outliers inf", "outlier share"),
+            ("--placements 0", "placements"),
+            ("--square-mm 0", "square_mm"),
+            ("--bits 12", "--bits"),
+            ("--image-noise nan", "--image-noise"),
+            ("--missing 0 --angles 180", "matches found"),
+        ] {
+            let message = refused(line);
+            assert!(message.contains(named), "{line}: {message}");
+        }
+    }
+
+    #[test]
+    fn images_replace_corners_unless_both_are_wanted() {
+        let corners_of = |line: &str| output_settings(&parse(line)).unwrap().corners;
+        assert!(corners_of("-o x"));
+        assert!(!corners_of("-o x --images"));
+        assert!(corners_of("-o x --images --corners"));
+    }
+}

@@ -27,4 +27,8 @@ pub use render::RenderSettings;
 pub use scene::{Scene, SceneError, SceneSettings};
 
 #[cfg(test)]
+mod output_tests;
+#[cfg(test)]
+mod render_tests;
+#[cfg(test)]
 mod tests;

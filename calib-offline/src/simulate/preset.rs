@@ -333,8 +333,8 @@ fn bumps(
     (0..count)
         .map(|_| {
             let center = PixelPoint::new(
-                random::between(&mut rng, 0.05, 0.95) * f64::from(sensor.width),
-                random::between(&mut rng, 0.05, 0.95) * f64::from(sensor.height),
+                random::between(&mut rng, 0.05, 0.95) * f64::from(sensor.width) - 0.5,
+                random::between(&mut rng, 0.05, 0.95) * f64::from(sensor.height) - 0.5,
             );
             let size = scale * random::between(&mut rng, amplitude_px[0], amplitude_px[1]);
             let angle = random::between(&mut rng, 0.0, std::f64::consts::TAU);
