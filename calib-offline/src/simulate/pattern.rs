@@ -94,8 +94,8 @@ impl Pattern {
     }
 }
 
-fn ink(is_black: bool) -> Option<f32> {
-    Some(if is_black { 0.0 } else { 1.0 })
+fn ink(is_black: bool) -> f32 {
+    if is_black { 0.0 } else { 1.0 }
 }
 
 fn chess(board: &BoardSpec, x: f64, y: f64) -> Shade {
@@ -114,8 +114,8 @@ fn chess(board: &BoardSpec, x: f64, y: f64) -> Shade {
         let within = |value: f64, extent: f64| value.clamp(-s * 0.999, extent + s * 0.999);
         let across = is_black(within(x, width_mm), within(y, height_mm));
         return Shade {
-            ink: ink(false),
-            beyond: ink(across),
+            ink: Some(ink(false)),
+            beyond: Some(ink(across)),
             edge_mm: -inside,
         };
     }
@@ -125,8 +125,8 @@ fn chess(board: &BoardSpec, x: f64, y: f64) -> Shade {
     // Beyond the outer squares everything is white, beside any other square is its opposite.
     let beyond = inside > edge_mm && !here;
     Shade {
-        ink: ink(here),
-        beyond: ink(beyond),
+        ink: Some(ink(here)),
+        beyond: Some(ink(beyond)),
         edge_mm,
     }
 }
@@ -149,8 +149,8 @@ fn ring(x: f64, y: f64) -> Shade {
     let to_other = (RING_PITCH_MM - radius).max(radius) - DIRECTION_RADII_MM.0;
     let here = (inner..outer).contains(&radius);
     Shade {
-        ink: ink(here),
-        beyond: ink(if edge <= to_other { !here } else { here }),
+        ink: Some(ink(here)),
+        beyond: Some(ink(if edge <= to_other { !here } else { here })),
         edge_mm: edge.min(to_other),
     }
 }

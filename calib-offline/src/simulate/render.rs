@@ -108,7 +108,8 @@ impl PlateView<'_> {
             .ray(pixel)?
             .transformed(&self.camera_from_plate.inverse());
         // The face is seen by rays along the plate's z.
-        if !(ray.direction.z > MIN_FACING_COS) {
+        let cos = ray.direction.z;
+        if cos.is_nan() || cos <= MIN_FACING_COS {
             return None;
         }
         let at_height = |z: f64| {
