@@ -32,6 +32,18 @@ pub struct SimulateArgs {
     /// Corner noise per axis, standard deviation, px
     #[arg(long, default_value_t = 0.05, value_name = "PX")]
     pub noise_px: f64,
+    /// Correlation of the noise of neighboring corners, 0 to 0.99
+    #[arg(long, default_value_t = 0.0, value_name = "RHO")]
+    pub noise_correlation: f64,
+    /// Student-t noise with this many degrees of freedom [default: Gaussian]
+    #[arg(long, value_name = "NU")]
+    pub noise_tail: Option<f64>,
+    /// Number the corners of a view from the wrong end: left:3 is pose 3 of the left camera
+    #[arg(long, value_name = "CAMERA:POSE")]
+    pub flip: Vec<String>,
+    /// Let the right camera expose a pose late, after the board has moved on
+    #[arg(long, value_name = "POSE")]
+    pub late: Vec<usize>,
     /// Noise of the pixels to measure per axis, standard deviation, px
     #[arg(long, default_value_t = 0.05, value_name = "PX")]
     pub match_noise_px: f64,
@@ -128,6 +140,14 @@ fn scene_settings(args: &SimulateArgs) -> Result<SceneSettings, SimulateError> {
         settings.angles_deg = parse_angles(text)?;
     }
     settings.noise_px = args.noise_px;
+    settings.noise_correlation = args.noise_correlation;
+    settings.noise_tail = args.noise_tail;
+    settings.flipped_views = args
+        .flip
+        .iter()
+        .map(|text| parse_view(text))
+        .collect::<Result<_, _>>()?;
+    settings.unsynchronized_poses.clone_from(&args.late);
     settings.match_noise_px = args.match_noise_px;
     settings.missing_share = args.missing;
     settings.outlier_share = args.outliers;
@@ -185,6 +205,23 @@ fn parse_sensor(text: &str) -> Result<SensorSize, SimulateError> {
             option: "--sensor",
             text: text.to_owned(),
             expected: "WIDTHxHEIGHT in pixels, such as 1280x1024",
+        })
+}
+
+fn parse_view(text: &str) -> Result<(usize, usize), SimulateError> {
+    text.split_once(':')
+        .and_then(|(camera, pose)| {
+            let camera_idx = match camera {
+                "left" => 0,
+                "right" => 1,
+                _ => return None,
+            };
+            Some((camera_idx, pose.parse().ok()?))
+        })
+        .ok_or_else(|| SimulateError::Argument {
+            option: "--flip",
+            text: text.to_owned(),
+            expected: "left:POSE or right:POSE",
         })
 }
 
@@ -281,6 +318,10 @@ mod tests {
             ("--placements 0", "placements"),
             ("--square-mm 0", "square_mm"),
             ("--bits 12", "--bits"),
+            ("--flip top:1", "--flip"),
+            ("--flip left:99", "flipped view"),
+            ("--late 34", "unsynchronized pose"),
+            ("--noise-tail 2", "noise tail"),
             ("--image-noise nan", "--image-noise"),
             ("--missing 0 --angles 180", "matches found"),
         ] {

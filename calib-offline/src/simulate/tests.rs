@@ -332,3 +332,89 @@ fn hulls_contain_their_inside_and_nothing_else() {
     assert!(!matches::contains(&hull, PixelPoint::new(4.1, 2.0)));
     assert!(!matches::contains(&[], PixelPoint::new(0.0, 0.0)));
 }
+
+#[test]
+fn correlated_and_heavy_tailed_noise_keep_their_size() {
+    let plain = SceneSettings::standard_noisy(OpticsKind::Brown, 8);
+    let observe = |settings: SceneSettings| {
+        let scene = scene(settings);
+        let views = scene.observe_corners();
+        (errors(&scene, &views), views)
+    };
+    let (correlated, views) = observe(SceneSettings {
+        noise_correlation: 0.5,
+        ..plain.clone()
+    });
+    let rms = |errors: &[[f64; 2]]| {
+        let sum: f64 = errors.iter().flatten().map(|e| e * e).sum();
+        (sum / (2.0 * errors.len() as f64)).sqrt()
+    };
+    // Correlation leaves about a ninth ((1 - r)^2 / (1 + r)^2) of the numbers' information.
+    let n = correlated.len() as f64 * 2.0;
+    assert!((rms(&correlated) / 0.05 - 1.0).abs() < 4.0 / (2.0 * n / 9.0).sqrt());
+    let labels: Vec<(usize, usize)> = corners(&views).map(|(_, _, c)| (c.row, c.col)).collect();
+    let (mut product, mut pairs) = (0.0, 0.0);
+    for k in 1..labels.len() {
+        if labels[k - 1].0 == labels[k].0 && labels[k - 1].1 + 1 == labels[k].1 {
+            product += correlated[k - 1][0] * correlated[k][0] / 0.0025;
+            pairs += 1.0;
+        }
+    }
+    assert!((product / pairs - 0.5).abs() < 4.0 / (pairs / 9.0_f64).sqrt());
+
+    let (heavy, _) = observe(SceneSettings {
+        noise_tail: Some(5.0),
+        ..plain.clone()
+    });
+    // The fourth moment of t_5 is 9, so the RMS scatters by sqrt(8 / 4n); a wide 5 % covers it.
+    assert!((rms(&heavy) / 0.05 - 1.0).abs() < 0.05, "{}", rms(&heavy));
+    let beyond = |errors: &[[f64; 2]]| errors.iter().flatten().filter(|e| e.abs() > 0.2).count();
+    let (gaussian, _) = observe(plain);
+    assert!(beyond(&gaussian) < 10 && beyond(&heavy) > 50);
+}
+
+#[test]
+fn a_flipped_view_is_numbered_from_the_other_end_and_no_other() {
+    let right = scene(small(OpticsKind::Brown));
+    let wrong = scene(SceneSettings {
+        flipped_views: vec![(1, 4)],
+        ..right.settings.clone()
+    });
+    for (a, b) in right.observe_corners().iter().zip(&wrong.observe_corners()) {
+        if (a.camera_idx, a.pose) != (1, 4) {
+            assert_eq!(a, b);
+            continue;
+        }
+        assert_eq!(a.corners.len(), b.corners.len());
+        for (corner, other) in a.corners.iter().zip(b.corners.iter().rev()) {
+            assert_eq!((14 - corner.row, 12 - corner.col), (other.row, other.col));
+            assert_eq!(corner.pixel, other.pixel);
+        }
+    }
+}
+
+#[test]
+fn a_late_exposure_moves_the_right_view_by_some_pixels() {
+    let right = scene(small(OpticsKind::Brown));
+    let late = scene(SceneSettings {
+        unsynchronized_poses: vec![2],
+        ..right.settings.clone()
+    });
+    assert_eq!(right.true_poses, late.true_poses);
+    for (a, b) in right.observe_corners().iter().zip(&late.observe_corners()) {
+        if (a.camera_idx, a.pose) != (1, 2) {
+            assert_eq!(a, b);
+            continue;
+        }
+        let shifts: Vec<f64> = b
+            .corners
+            .iter()
+            .filter_map(|corner| {
+                let clean = right.true_corner(1, 2, corner.row, corner.col)?;
+                Some(clean.distance_px(corner.pixel))
+            })
+            .collect();
+        let mean_px = shifts.iter().sum::<f64>() / shifts.len() as f64;
+        assert!(mean_px > 1.0 && mean_px < 4.0, "{mean_px} px");
+    }
+}
