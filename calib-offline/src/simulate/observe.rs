@@ -88,20 +88,20 @@ impl Scene {
         // neighbors the correlation asked for.
         let rho = settings.noise_correlation;
         let fresh = (1.0 - rho * rho).sqrt();
-        for k in 0..2 {
-            for row in 0..rows {
-                for col in 1..cols {
-                    let before = noise[row * cols + col - 1][k];
-                    let here = &mut noise[row * cols + col][k];
-                    *here = rho * before + fresh * *here;
-                }
+        let follow = |noise: &mut Vec<[f64; 2]>, from: usize, to: usize| {
+            let before = noise[from];
+            for (here, before) in noise[to].iter_mut().zip(before) {
+                *here = rho * before + fresh * *here;
             }
-            for row in 1..rows {
-                for col in 0..cols {
-                    let before = noise[(row - 1) * cols + col][k];
-                    let here = &mut noise[row * cols + col][k];
-                    *here = rho * before + fresh * *here;
-                }
+        };
+        for row in 0..rows {
+            for col in 1..cols {
+                follow(&mut noise, row * cols + col - 1, row * cols + col);
+            }
+        }
+        for row in 1..rows {
+            for col in 0..cols {
+                follow(&mut noise, (row - 1) * cols + col, row * cols + col);
             }
         }
         let mut tail_rng = random::stream(settings.seed, Purpose::NoiseTail, camera_idx, pose);

@@ -90,6 +90,14 @@ pub(super) struct RigPreset {
     pub spread_look_deg: [f64; 2],
 }
 
+impl RigPreset {
+    /// Brings the placements closer together (or farther apart) across the view.
+    pub fn scale_spread(&mut self, share: f64) {
+        self.spread_shift_mm = self.spread_shift_mm.map(|shift| shift * share);
+        self.spread_look_deg = self.spread_look_deg.map(|look| look * share);
+    }
+}
+
 /// Geometry that kinds differ in.
 struct Layout {
     baseline_mm: f64,

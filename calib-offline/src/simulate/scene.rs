@@ -48,7 +48,8 @@ impl Scene {
     /// [`SceneError::OutOfRange`] if a setting makes no sense.
     pub fn new(settings: SceneSettings) -> Result<Self, SceneError> {
         settings.check()?;
-        let rig = preset::rig(settings.optics, settings.sensor);
+        let mut rig = preset::rig(settings.optics, settings.sensor);
+        rig.scale_spread(settings.spread);
         let placements = preset::placements(&rig, settings.placements, settings.seed);
         let left_from_bench = rig.bench_from_camera[0].inverse();
         let wobble = Wobble {

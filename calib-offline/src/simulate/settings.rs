@@ -16,6 +16,10 @@ pub struct SceneSettings {
     pub board: BoardSpec,
     /// How often the stage is put somewhere else.
     pub placements: usize,
+    /// How far apart the placements stand across the view, as a share of what covers the image.
+    /// At 1 the image's edge cuts many boards off; with 0.3 and a board of 8 mm squares every
+    /// corner of the pinhole rig is seen.
+    pub spread: f64,
     /// Dial readings at each placement, degrees.
     pub angles_deg: Vec<f64>,
     /// Standard deviation of the corners per axis, px.
@@ -68,6 +72,7 @@ impl SceneSettings {
                 square_mm: 10.0,
             },
             placements,
+            spread: 1.0,
             angles_deg: (-half_count..=half_count)
                 .map(|k| f64::from(k) * step_deg)
                 .collect(),
@@ -110,6 +115,7 @@ impl SceneSettings {
         number("board rows", self.board.rows as f64, 2.0, 1000.0)?;
         number("board columns", self.board.cols as f64, 2.0, 1000.0)?;
         number("square_mm", self.board.square_mm, 1e-3, 1e4)?;
+        number("spread", self.spread, 0.0, 3.0)?;
         number("placements", self.placements as f64, 1.0, 1000.0)?;
         number(
             "number of angles",

@@ -418,3 +418,15 @@ fn a_late_exposure_moves_the_right_view_by_some_pixels() {
         assert!(mean_px > 1.0 && mean_px < 4.0, "{mean_px} px");
     }
 }
+
+#[test]
+fn a_small_board_at_close_placements_is_seen_whole() {
+    let mut settings = SceneSettings {
+        spread: 0.3,
+        ..SceneSettings::standard(OpticsKind::Brown, 1)
+    };
+    settings.board.square_mm = 8.0;
+    let views = scene(settings).observe_corners();
+    assert_eq!(views.len(), 68);
+    assert!(views.iter().all(|view| view.corners.len() == 195));
+}
