@@ -36,6 +36,18 @@ pub struct SimulateArgs {
     /// Corner noise per axis, standard deviation, px
     #[arg(long, default_value_t = 0.05, value_name = "PX")]
     pub noise_px: f64,
+    /// Correlation of the noise of neighboring corners, 0 to 0.99
+    #[arg(long, default_value_t = 0.0, value_name = "RHO")]
+    pub noise_correlation: f64,
+    /// Student-t noise with this many degrees of freedom [default: Gaussian]
+    #[arg(long, value_name = "NU")]
+    pub noise_tail: Option<f64>,
+    /// Number the corners of a view from the wrong end: left:3 is pose 3 of the left camera
+    #[arg(long, value_name = "CAMERA:POSE")]
+    pub flip: Vec<String>,
+    /// Let the right camera expose a pose late, after the board has moved on
+    #[arg(long, value_name = "POSE")]
+    pub late: Vec<usize>,
     /// Noise of the pixels to measure per axis, standard deviation, px
     #[arg(long, default_value_t = 0.05, value_name = "PX")]
     pub match_noise_px: f64,
@@ -48,6 +60,10 @@ pub struct SimulateArgs {
     /// How often the stage is put somewhere else [default: 2, fisheye 5]
     #[arg(long, value_name = "N")]
     pub placements: Option<usize>,
+    /// How far apart the placements stand: 1 covers the image and cuts boards off at its edge;
+    /// 0.3 with --square-mm 8 keeps them whole
+    #[arg(long, default_value_t = 1.0, value_name = "SHARE")]
+    pub spread: f64,
     /// Dial readings per placement, degrees: FROM:STEP:TO or a list A,B,C
     /// [default: -40:5:40, fisheye -40:10:40]
     #[arg(long, allow_hyphen_values = true, value_name = "ANGLES")]
@@ -168,10 +184,19 @@ fn scene_settings(args: &SimulateArgs) -> Result<SceneSettings, SimulateError> {
     settings.board.cols = args.cols;
     settings.board.square_mm = args.square_mm;
     settings.placements = args.placements.unwrap_or(settings.placements);
+    settings.spread = args.spread;
     if let Some(text) = &args.angles {
         settings.angles_deg = parse_angles(text)?;
     }
     settings.noise_px = args.noise_px;
+    settings.noise_correlation = args.noise_correlation;
+    settings.noise_tail = args.noise_tail;
+    settings.flipped_views = args
+        .flip
+        .iter()
+        .map(|text| parse_view(text))
+        .collect::<Result<_, _>>()?;
+    settings.unsynchronized_poses.clone_from(&args.late);
     settings.match_noise_px = args.match_noise_px;
     settings.missing_share = args.missing;
     settings.outlier_share = args.outliers;
@@ -232,6 +257,23 @@ fn parse_sensor(text: &str) -> Result<SensorSize, SimulateError> {
         })
 }
 
+fn parse_view(text: &str) -> Result<(usize, usize), SimulateError> {
+    text.split_once(':')
+        .and_then(|(camera, pose)| {
+            let camera_idx = match camera {
+                "left" => 0,
+                "right" => 1,
+                _ => return None,
+            };
+            Some((camera_idx, pose.parse().ok()?))
+        })
+        .ok_or_else(|| SimulateError::Argument {
+            option: "--flip",
+            text: text.to_owned(),
+            expected: "left:POSE or right:POSE",
+        })
+}
+
 fn parse_angles(text: &str) -> Result<Vec<f64>, SimulateError> {
     let wrong = || SimulateError::Argument {
         option: "--angles",
@@ -259,5 +301,89 @@ fn parse_angles(text: &str) -> Result<Vec<f64>, SimulateError> {
             Ok((0..=last).map(|k| from + f64::from(k) * step).collect())
         }
         _ => Err(wrong()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Command {
+        #[command(flatten)]
+        args: SimulateArgs,
+    }
+
+    fn parse(line: &str) -> SimulateArgs {
+        let words = std::iter::once("simulate").chain(line.split_whitespace());
+        Command::try_parse_from(words).unwrap().args
+    }
+
+    fn refused(line: &str) -> String {
+        let home = tempfile::tempdir().unwrap();
+        let mut args = parse(&format!("-o out {line}"));
+        args.output = home.path().join("out");
+        let message = run(&args).unwrap_err().to_string();
+        assert!(!args.output.exists(), "{line} left something behind");
+        message
+    }
+
+    #[test]
+    fn defaults_are_the_standard_dataset_with_noise() {
+        let settings = scene_settings(&parse("-o x --optics port --seed 7")).unwrap();
+        assert_eq!(settings, SceneSettings::standard_noisy(OpticsKind::Port, 7));
+        let fisheye = scene_settings(&parse("-o x --optics fisheye")).unwrap();
+        assert_eq!((fisheye.placements, fisheye.angles_deg.len()), (5, 9));
+    }
+
+    #[test]
+    fn angles_are_a_range_or_a_list() {
+        assert_eq!(
+            parse_angles("-40:20:40").unwrap(),
+            [-40., -20., 0., 20., 40.]
+        );
+        assert_eq!(parse_angles("10:-4:1").unwrap(), [10.0, 6.0, 2.0]);
+        assert_eq!(parse_angles("0:0.1:0.3").unwrap().len(), 4);
+        assert_eq!(parse_angles("3, -7.5").unwrap(), [3.0, -7.5]);
+        for wrong in [
+            "", "a", "1:2", "0:1:nan", "0:0:5", "0:-1:5", "0:1e-9:1", "1,,2",
+        ] {
+            assert!(parse_angles(wrong).is_err(), "{wrong}");
+        }
+        let settings = scene_settings(&parse("-o x --angles -6:3:6")).unwrap();
+        assert_eq!(settings.angles_deg.len(), 5);
+    }
+
+    #[test]
+    fn senseless_options_are_named_and_leave_nothing_behind() {
+        for (line, named) in [
+            ("--sensor 1280", "--sensor"),
+            ("--sensor 12x-3", "--sensor"),
+            ("--angles 1:2", "--angles"),
+            ("--noise-px nan", "noise_px"),
+            ("--missing 1.2", "missing share"),
+            ("--outliers inf", "outlier share"),
+            ("--placements 0", "placements"),
+            ("--square-mm 0", "square_mm"),
+            ("--bits 12", "--bits"),
+            ("--flip top:1", "--flip"),
+            ("--flip left:99", "flipped view"),
+            ("--late 34", "unsynchronized pose"),
+            ("--noise-tail 2", "noise tail"),
+            ("--image-noise nan", "--image-noise"),
+            ("--missing 0 --angles 180", "matches found"),
+        ] {
+            let message = refused(line);
+            assert!(message.contains(named), "{line}: {message}");
+        }
+    }
+
+    #[test]
+    fn images_replace_corners_unless_both_are_wanted() {
+        let corners_of = |line: &str| output_settings(&parse(line)).unwrap().corners;
+        assert!(corners_of("-o x"));
+        assert!(!corners_of("-o x --images"));
+        assert!(corners_of("-o x --images --corners"));
     }
 }

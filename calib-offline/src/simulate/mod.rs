@@ -8,7 +8,9 @@
 //! Shares `geometry`, `board` and the corner types of `dataset` with the estimator, and nothing
 //! else: a mistake in the ray field cannot hide in both.
 
+mod images;
 pub mod matches;
+mod observe;
 pub mod optics;
 pub mod output;
 pub mod pattern;
@@ -16,7 +18,9 @@ pub mod preset;
 pub mod random;
 pub mod render;
 pub mod scene;
+pub mod settings;
 pub mod stage;
+mod tables;
 pub mod target;
 
 pub use matches::{MatchSet, TrueMatch};
@@ -24,7 +28,12 @@ pub use optics::CameraOptics;
 pub use output::{ImageDepth, OutputSettings, SimulateError, SimulateSummary, write_dataset};
 pub use preset::OpticsKind;
 pub use render::RenderSettings;
-pub use scene::{Scene, SceneError, SceneSettings};
+pub use scene::Scene;
+pub use settings::{SceneError, SceneSettings};
 
+#[cfg(test)]
+mod output_tests;
+#[cfg(test)]
+mod render_tests;
 #[cfg(test)]
 mod tests;

@@ -36,12 +36,16 @@ pub fn is_direction_marker(row: usize, col: usize) -> bool {
     DIRECTION_MARKERS.contains(&(row, col))
 }
 
-/// What a point of the plane shows, and how far it is from where that changes.
-#[derive(Debug, Clone, Copy)]
+/// What a point of the plane shows, and what lies beyond the nearest edge.
+///
+/// 0 is black, 1 white; `None` is beyond the plate.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Shade {
-    /// 0 black, 1 white; `None` beyond the plate.
+    /// Here.
     pub ink: Option<f32>,
-    /// No edge is nearer than this, mm.
+    /// Across the nearest edge; may be the same where there is none worth the name.
+    pub beyond: Option<f32>,
+    /// Distance of that edge, mm: no other is nearer.
     pub edge_mm: f64,
 }
 
@@ -70,36 +74,64 @@ impl Pattern {
         if inside < 0.0 {
             return Shade {
                 ink: None,
+                beyond: Some(1.0),
                 edge_mm: -inside,
             };
         }
-        let (is_black, edge_mm) = match self {
+        let print = match self {
             Self::Chessboard(board) => chess(board, x, y),
             Self::RingTarget => ring(x, y),
         };
-        Shade {
-            ink: Some(if is_black { 0.0 } else { 1.0 }),
-            edge_mm: edge_mm.min(inside),
+        if print.edge_mm < inside {
+            print
+        } else {
+            Shade {
+                beyond: None,
+                edge_mm: inside,
+                ..print
+            }
         }
     }
 }
 
-fn chess(board: &BoardSpec, x: f64, y: f64) -> (bool, f64) {
+fn ink(is_black: bool) -> f32 {
+    if is_black { 0.0 } else { 1.0 }
+}
+
+fn chess(board: &BoardSpec, x: f64, y: f64) -> Shade {
     let s = board.square_mm;
+    let is_black = |x: f64, y: f64| {
+        let square = (x / s).floor() as i64 + (y / s).floor() as i64;
+        square.rem_euclid(2) == 0
+    };
     let (width_mm, height_mm) = board.extent_mm();
     let inside = (x + s)
         .min(width_mm + s - x)
         .min(y + s)
         .min(height_mm + s - y);
     if inside < 0.0 {
-        return (false, -inside);
+        // On the white margin; a border square lies across the edge.
+        let within = |value: f64, extent: f64| value.clamp(-s * 0.999, extent + s * 0.999);
+        let across = is_black(within(x, width_mm), within(y, height_mm));
+        return Shade {
+            ink: Some(ink(false)),
+            beyond: Some(ink(across)),
+            edge_mm: -inside,
+        };
     }
     let to_line = |value: f64| (value - (value / s).round() * s).abs();
-    let square = (x / s).floor() as i64 + (y / s).floor() as i64;
-    (square.rem_euclid(2) == 0, to_line(x).min(to_line(y)))
+    let edge_mm = to_line(x).min(to_line(y));
+    let here = is_black(x, y);
+    // Beyond the outer squares everything is white, beside any other square is its opposite.
+    let beyond = inside > edge_mm && !here;
+    Shade {
+        ink: Some(ink(here)),
+        beyond: Some(ink(beyond)),
+        edge_mm,
+    }
 }
 
-fn ring(x: f64, y: f64) -> (bool, f64) {
+fn ring(x: f64, y: f64) -> Shade {
     let nearest = |value: f64, count: usize| {
         (value / RING_PITCH_MM)
             .round()
@@ -115,5 +147,10 @@ fn ring(x: f64, y: f64) -> (bool, f64) {
     let edge = (radius - outer).abs().min((radius - inner).abs());
     // Another marker's center is no nearer than this one's, and no nearer than the pitch leaves.
     let to_other = (RING_PITCH_MM - radius).max(radius) - DIRECTION_RADII_MM.0;
-    ((inner..outer).contains(&radius), edge.min(to_other))
+    let here = (inner..outer).contains(&radius);
+    Shade {
+        ink: Some(ink(here)),
+        beyond: Some(ink(if edge <= to_other { !here } else { here })),
+        edge_mm: edge.min(to_other),
+    }
 }

@@ -90,6 +90,14 @@ pub(super) struct RigPreset {
     pub spread_look_deg: [f64; 2],
 }
 
+impl RigPreset {
+    /// Brings the placements closer together (or farther apart) across the view.
+    pub fn scale_spread(&mut self, share: f64) {
+        self.spread_shift_mm = self.spread_shift_mm.map(|shift| shift * share);
+        self.spread_look_deg = self.spread_look_deg.map(|look| look * share);
+    }
+}
+
 /// Geometry that kinds differ in.
 struct Layout {
     baseline_mm: f64,
@@ -256,19 +264,7 @@ fn camera(kind: OpticsKind, idx: usize, sensor: SensorSize) -> (Lens, Media) {
                 index_behind: 1.333,
             }),
         ),
-        OpticsKind::Fisheye => {
-            let short_side = f64::from(sensor.width.min(sensor.height * 5 / 4));
-            let focal_px = 440.0 * short_side / 1280.0 * (1.0 + 0.004 * side);
-            let fisheye = FisheyeLens {
-                focal_px,
-                principal,
-                k1: 0.012 + 0.004 * side,
-                k2: -0.006,
-                pupil_mm: [1.4 + 0.1 * side, 0.15],
-                max_angle_rad: 82.5_f64.to_radians(),
-            };
-            (Lens::Fisheye(fisheye), Media::Air)
-        }
+        OpticsKind::Fisheye => (fisheye(sensor, principal, side), Media::Air),
         OpticsKind::Wide => {
             let division = Distortion::Division {
                 l1: -0.20 + 0.01 * side,
@@ -299,6 +295,19 @@ fn camera(kind: OpticsKind, idx: usize, sensor: SensorSize) -> (Lens, Media) {
             (perspective(focal_px, brown, Vec::new()), Media::Air)
         }
     }
+}
+
+/// 165 degrees across 1270 of 1280 px; the pupil moves by some 3 mm.
+fn fisheye(sensor: SensorSize, principal: PixelPoint, side: f64) -> Lens {
+    let long_side = f64::from(sensor.width.min(sensor.height * 5 / 4));
+    Lens::Fisheye(FisheyeLens {
+        focal_px: 440.0 * long_side / 1280.0 * (1.0 + 0.004 * side),
+        principal,
+        k1: 0.012 + 0.004 * side,
+        k2: -0.006,
+        pupil_mm: [1.4 + 0.1 * side, 0.15],
+        max_angle_rad: 82.5_f64.to_radians(),
+    })
 }
 
 /// Unit normal of a plate turned by degrees about x and y from facing the lens.
@@ -333,8 +342,8 @@ fn bumps(
     (0..count)
         .map(|_| {
             let center = PixelPoint::new(
-                random::between(&mut rng, 0.05, 0.95) * f64::from(sensor.width),
-                random::between(&mut rng, 0.05, 0.95) * f64::from(sensor.height),
+                random::between(&mut rng, 0.05, 0.95) * f64::from(sensor.width) - 0.5,
+                random::between(&mut rng, 0.05, 0.95) * f64::from(sensor.height) - 0.5,
             );
             let size = scale * random::between(&mut rng, amplitude_px[0], amplitude_px[1]);
             let angle = random::between(&mut rng, 0.0, std::f64::consts::TAU);

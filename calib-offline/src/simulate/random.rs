@@ -23,6 +23,8 @@ pub(super) enum Purpose {
     MatchNoise = 7,
     /// Noise of the rendered images.
     ImageNoise = 8,
+    /// Heavy tails of the corner noise.
+    NoiseTail = 10,
     /// Placements beyond the listed ones.
     Placements = 9,
 }

@@ -3,156 +3,21 @@
 use super::matches::{contains, convex_hull};
 use super::optics::CameraOptics;
 use super::pattern::Pattern;
-use super::preset::{self, OpticsKind, RigPreset};
-use super::random::{self, Purpose};
+use super::preset::{self, RigPreset};
 use super::render::{PlateView, RenderSettings, Rendered};
+use super::settings::{SceneError, SceneSettings};
 use super::stage::{self, Placement, Wobble};
-use crate::board::BoardSpec;
-use crate::dataset::{Corner, View};
-use crate::geometry::{PixelPoint, Ray, RigidTransform, SensorSize};
+use crate::geometry::{PixelPoint, Ray, RigidTransform, so3};
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
 
 /// A corner seen at a flatter angle than this against the board's normal (75 degrees) is lost to
 /// any detector.
 const MIN_FACING_COS: f64 = 0.26;
 
-/// What to simulate. The default is the standard dataset of the pinhole rig, free of noise.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SceneSettings {
-    /// Optics and rig.
-    pub optics: OpticsKind,
-    /// Sensor of both cameras (of the left one, for unequal rigs).
-    pub sensor: SensorSize,
-    /// The board.
-    pub board: BoardSpec,
-    /// How often the stage is put somewhere else.
-    pub placements: usize,
-    /// Dial readings at each placement, degrees.
-    pub angles_deg: Vec<f64>,
-    /// Standard deviation of the corners per axis, px.
-    pub noise_px: f64,
-    /// Standard deviation of the pixels of matches per axis, px.
-    pub match_noise_px: f64,
-    /// Share of corners that are not found.
-    pub missing_share: f64,
-    /// Share of corners that are displaced by 3 to 10 px.
-    pub outlier_share: f64,
-    /// Out-of-plane height of the board's outermost corners over its middle, mm (a paraboloid).
-    pub bow_mm: f64,
-    /// Run-out of the stage at the board's middle, standard deviation per axis, mm.
-    pub runout_mm: f64,
-    /// Wobble of the stage, standard deviation per axis, degrees.
-    pub wobble_deg: f64,
-    /// Of everything random.
-    pub seed: u64,
-}
-
-impl Default for SceneSettings {
-    fn default() -> Self {
-        Self::standard(OpticsKind::Brown, 1)
-    }
-}
-
-impl SceneSettings {
-    /// The standard dataset of a rig without corner noise: 2 placements x 17 angles (-40 to 40 by
-    /// 5 degrees), for the fisheye 5 x 9 (by 10 degrees). Matches carry 0.05 px.
-    pub fn standard(optics: OpticsKind, seed: u64) -> Self {
-        let (placements, half_count, step_deg) = match optics {
-            OpticsKind::Fisheye => (5, 4, 10.0),
-            _ => (2, 8, 5.0),
-        };
-        Self {
-            optics,
-            sensor: SensorSize::new(1280, 1024),
-            board: BoardSpec {
-                rows: 15,
-                cols: 13,
-                square_mm: 10.0,
-            },
-            placements,
-            angles_deg: (-half_count..=half_count)
-                .map(|k| f64::from(k) * step_deg)
-                .collect(),
-            noise_px: 0.0,
-            match_noise_px: 0.05,
-            missing_share: 0.0,
-            outlier_share: 0.0,
-            bow_mm: 0.0,
-            runout_mm: 0.004,
-            wobble_deg: 0.001,
-            seed,
-        }
-    }
-
-    /// [`Self::standard`] with 0.05 px of corner noise.
-    pub fn standard_noisy(optics: OpticsKind, seed: u64) -> Self {
-        Self {
-            noise_px: 0.05,
-            ..Self::standard(optics, seed)
-        }
-    }
-
-    fn check(&self) -> Result<(), SceneError> {
-        let number = |name: &'static str, value: f64, low: f64, high: f64| {
-            if value >= low && value <= high {
-                Ok(())
-            } else {
-                Err(SceneError::OutOfRange {
-                    name,
-                    value,
-                    low,
-                    high,
-                })
-            }
-        };
-        number("board rows", self.board.rows as f64, 2.0, 1000.0)?;
-        number("board columns", self.board.cols as f64, 2.0, 1000.0)?;
-        number("square_mm", self.board.square_mm, 1e-3, 1e4)?;
-        number("placements", self.placements as f64, 1.0, 1000.0)?;
-        number(
-            "number of angles",
-            self.angles_deg.len() as f64,
-            1.0,
-            1000.0,
-        )?;
-        for &angle in &self.angles_deg {
-            number("angle in degrees", angle, -180.0, 180.0)?;
-        }
-        number("noise_px", self.noise_px, 0.0, 100.0)?;
-        number("match_noise_px", self.match_noise_px, 0.0, 100.0)?;
-        number("missing share", self.missing_share, 0.0, 1.0)?;
-        number("outlier share", self.outlier_share, 0.0, 1.0)?;
-        number("bow_mm", self.bow_mm, -10.0, 10.0)?;
-        number("runout_mm", self.runout_mm, 0.0, 10.0)?;
-        number("wobble_deg", self.wobble_deg, 0.0, 10.0)?;
-        number("sensor width", f64::from(self.sensor.width), 64.0, 20000.0)?;
-        number(
-            "sensor height",
-            f64::from(self.sensor.height),
-            64.0,
-            20000.0,
-        )
-    }
-}
-
-/// Why a scene cannot be made.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SceneError {
-    /// A setting makes no sense.
-    #[error("{name} is {value}, it must lie between {low} and {high}")]
-    OutOfRange {
-        /// Which.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// The least allowed.
-        low: f64,
-        /// The most allowed.
-        high: f64,
-    },
-}
+/// How far the board goes on before a late exposure: some 2 px on the standard rigs.
+const LATE_SHIFT_MM: Vector3<f64> = Vector3::new(0.3, -0.1, 0.15);
+/// And how it turns meanwhile.
+const LATE_TURN_DEG: Vector3<f64> = Vector3::new(0.05, 0.3, -0.02);
 
 /// A rig, a board and the truth about them. Poses are in the rig frame, which is the left camera's.
 #[derive(Debug, Clone)]
@@ -183,7 +48,8 @@ impl Scene {
     /// [`SceneError::OutOfRange`] if a setting makes no sense.
     pub fn new(settings: SceneSettings) -> Result<Self, SceneError> {
         settings.check()?;
-        let rig = preset::rig(settings.optics, settings.sensor);
+        let mut rig = preset::rig(settings.optics, settings.sensor);
+        rig.scale_spread(settings.spread);
         let placements = preset::placements(&rig, settings.placements, settings.seed);
         let left_from_bench = rig.bench_from_camera[0].inverse();
         let wobble = Wobble {
@@ -271,6 +137,22 @@ impl Scene {
         self.project_board_point(camera_idx, left_from_board, &self.corner_in_board(row, col))
     }
 
+    /// Where the board is when a camera exposes a pose, left camera frame: the true pose, save for
+    /// the right camera's late exposures. `pose` must exist.
+    pub fn exposed_pose(&self, camera_idx: usize, pose: usize) -> RigidTransform {
+        let left_from_board = self.true_poses[pose];
+        if camera_idx == 0 || !self.settings.unsynchronized_poses.contains(&pose) {
+            return left_from_board;
+        }
+        let middle_in_board = self.settings.board.center_in_board();
+        let turn = so3::exp(&LATE_TURN_DEG.map(f64::to_radians));
+        let board_from_late = RigidTransform::new(
+            turn,
+            middle_in_board - turn * middle_in_board + LATE_SHIFT_MM,
+        );
+        left_from_board * board_from_late
+    }
+
     /// As [`Self::true_corner`], for any point of a board at any pose.
     pub(super) fn project_board_point(
         &self,
@@ -297,7 +179,7 @@ impl Scene {
         let camera_from_left = self.left_from_camera[camera_idx].inverse();
         let view = PlateView {
             camera: &self.cameras[camera_idx],
-            camera_from_plate: camera_from_left * self.true_poses[pose],
+            camera_from_plate: camera_from_left * self.exposed_pose(camera_idx, pose),
             pattern: Pattern::Chessboard(self.settings.board),
             bow_mm: self.settings.bow_mm,
         };
@@ -337,69 +219,5 @@ impl Scene {
             }
         }
         f64::from(in_hull) / f64::from(in_image.max(1))
-    }
-
-    /// What a detector would report: every visible corner with noise, some missing, some wrong.
-    ///
-    /// Views in the order camera, pose; corners in the order row, column. A view without corners
-    /// is left out.
-    pub fn observe_corners(&self) -> Vec<View> {
-        let mut views = Vec::new();
-        for camera_idx in 0..self.cameras.len() {
-            for pose in 0..self.true_poses.len() {
-                let corners = self.observe_view(camera_idx, pose);
-                if !corners.is_empty() {
-                    views.push(View {
-                        camera_idx,
-                        pose,
-                        corners,
-                    });
-                }
-            }
-        }
-        views
-    }
-
-    fn observe_view(&self, camera_idx: usize, pose: usize) -> Vec<Corner> {
-        let settings = &self.settings;
-        let stream = |purpose| random::stream(settings.seed, purpose, camera_idx, pose);
-        let mut noise_rng = stream(Purpose::Noise);
-        let mut missing_rng = stream(Purpose::Missing);
-        let mut outlier_rng = stream(Purpose::Outliers);
-        let sensor = self.cameras[camera_idx].sensor();
-        let mut corners = Vec::new();
-        for row in 0..settings.board.rows {
-            for col in 0..settings.board.cols {
-                // Drawn for every corner, seen or not: what one corner gets depends on no other.
-                let noise = [
-                    random::normal(&mut noise_rng),
-                    random::normal(&mut noise_rng),
-                ];
-                let is_missing = random::uniform(&mut missing_rng) < settings.missing_share;
-                let is_outlier = random::uniform(&mut outlier_rng) < settings.outlier_share;
-                let outlier_px = random::between(&mut outlier_rng, 3.0, 10.0);
-                let outlier_angle = random::between(&mut outlier_rng, 0.0, std::f64::consts::TAU);
-                let Some(clean) = self.true_corner(camera_idx, pose, row, col) else {
-                    continue;
-                };
-                let mut pixel = PixelPoint::new(
-                    clean.u + settings.noise_px * noise[0],
-                    clean.v + settings.noise_px * noise[1],
-                );
-                if is_outlier {
-                    pixel.u += outlier_px * outlier_angle.cos();
-                    pixel.v += outlier_px * outlier_angle.sin();
-                }
-                if !is_missing && sensor.contains(pixel) {
-                    corners.push(Corner {
-                        row,
-                        col,
-                        pixel,
-                        sigma_px: None,
-                    });
-                }
-            }
-        }
-        corners
     }
 }

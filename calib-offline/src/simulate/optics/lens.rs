@@ -45,7 +45,7 @@ pub struct Bump {
 pub enum Distortion {
     /// None: a pinhole.
     None,
-    /// Brown-Conrady with the coefficient order and signs that OpenCV made common; it maps ideal to
+    /// Brown-Conrady with the coefficient order and signs that `OpenCV` made common; it maps ideal to
     /// distorted coordinates, so its inverse is iterated.
     Brown {
         /// Radial, r^2.
@@ -197,7 +197,7 @@ impl FisheyeLens {
             let t2 = theta * theta;
             let value = theta * (1.0 + t2 * (self.k1 + t2 * self.k2));
             let slope = 1.0 + t2 * (3.0 * self.k1 + 5.0 * t2 * self.k2);
-            if !(slope > 0.0) {
+            if slope.is_nan() || slope <= 0.0 {
                 return None;
             }
             let step = (target - value) / slope;

@@ -40,7 +40,7 @@ fn snell(direction: &Vector3<f64>, normal: &Vector3<f64>, eta: f64) -> Option<Ve
         (*normal, facing)
     };
     let cos_out_squared = 1.0 - eta * eta * (1.0 - cos_in * cos_in);
-    if !(cos_out_squared > 0.0) {
+    if cos_out_squared.is_nan() || cos_out_squared <= 0.0 {
         return None;
     }
     let cos_out = cos_out_squared.sqrt();
@@ -87,7 +87,7 @@ impl FlatWindow {
         distance_mm: f64,
     ) -> Option<Vector3<f64>> {
         let cos = direction.dot(&self.normal);
-        if !(cos > 1e-9) {
+        if cos.is_nan() || cos <= 1e-9 {
             return None;
         }
         Some(origin_mm + direction * ((distance_mm - origin_mm.dot(&self.normal)) / cos))

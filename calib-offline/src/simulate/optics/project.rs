@@ -138,7 +138,7 @@ impl Miss {
 
     fn of(&self, ray: &Ray) -> Option<Vector2<f64>> {
         let cos = ray.direction.dot(&self.normal);
-        if !(cos > 1e-3) {
+        if cos.is_nan() || cos <= 1e-3 {
             return None;
         }
         let to_point = ray.origin_mm - self.point;
