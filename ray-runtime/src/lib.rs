@@ -1,2 +1,25 @@
-//! Runtime.
+#![doc = include_str!("../README.md")]
 #![no_std]
+#![forbid(unsafe_code)]
+
+#[cfg(target_endian = "big")]
+compile_error!("a blob is read in place and holds little-endian numbers");
+
+mod aligned;
+mod blob;
+mod camera;
+mod error;
+pub mod format;
+mod grid;
+mod lookup;
+mod ray;
+mod self_test;
+mod triangulate;
+
+pub use aligned::Aligned;
+pub use blob::RayBlob;
+pub use camera::{Camera, Region, RigFromCamera};
+pub use error::{LookupError, MeasureError, OpenError, Table};
+pub use ray::{PixelPoint, Ray};
+pub use self_test::{SelfTestFailure, SelfTests};
+pub use triangulate::{MIN_PARALLAX_SIN, Triangulation, triangulate_pair};

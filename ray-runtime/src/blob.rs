@@ -1,0 +1,429 @@
+//! A blob opened in place: everything is checked once, nothing is copied.
+
+use crate::camera::Camera;
+use crate::error::Table;
+use crate::format::{
+    self, ALIGNMENT, Axis, CameraMeta, Encoding, HEADER_LEN, Header, IDENTITY_LEN, MAGIC,
+    MAX_CAMERAS, MAX_CELLS, MAX_EXTENT_PX, MAX_MAGNITUDE, Meta, RECORD_LEN, RECORD_WORDS, Record,
+    SelfTest, VERSION,
+};
+use crate::self_test::SelfTests;
+use crate::triangulate::{self, Triangulation};
+use crate::{LookupError, MeasureError, OpenError, PixelPoint, Ray, lookup};
+
+/// A rig's ray fields, borrowed from the bytes they lie in.
+///
+/// It can only be made by [`RayBlob::open`], which checks everything; a lookup therefore needs no
+/// other check than whether the pixel is in the calibrated area.
+#[derive(Debug, Clone, Copy)]
+pub struct RayBlob<'a> {
+    bytes: &'a [u8],
+    /// The same bytes as words.
+    words: &'a [f32],
+    records: &'a [[u32; RECORD_WORDS]],
+    identity: &'a [u8; IDENTITY_LEN],
+    frame: &'a str,
+    written_by: &'a str,
+    camera_meta: &'a [u8],
+    self_tests: SelfTests<'a>,
+    max_error_px: f32,
+    working_distance_mm: f32,
+}
+
+impl<'a> RayBlob<'a> {
+    /// Checks the bytes and borrows them. They must start on a multiple of 8
+    /// ([`Aligned`](crate::Aligned)) and hold the blob and nothing more.
+    ///
+    /// The cost is one pass of the checksum and one over the numbers; nothing is copied.
+    ///
+    /// # Errors
+    /// Any [`OpenError`]. A blob that was cut short or had a bit changed is always refused.
+    pub fn open(bytes: &'a [u8]) -> Result<Self, OpenError> {
+        let header = checked_header(bytes)?;
+        let misalignment = bytes.as_ptr().addr() % ALIGNMENT;
+        if misalignment != 0 {
+            return Err(OpenError::Misaligned {
+                offset: misalignment as u8,
+            });
+        }
+        let words = bytemuck::try_cast_slice(bytes).map_err(|_| OpenError::BadHeader)?;
+        let meta_end = HEADER_LEN.saturating_add(header.meta_len as usize);
+        let meta_bytes = bytes
+            .get(HEADER_LEN..meta_end)
+            .ok_or(OpenError::BadHeader)?;
+        let records_start = format::aligned(meta_end);
+        let records_len = usize::from(header.camera_count) * RECORD_LEN;
+        let tables_start = records_start.saturating_add(records_len);
+        let records = bytes
+            .get(records_start..tables_start)
+            .ok_or(OpenError::BadHeader)?;
+        let records = bytemuck::try_cast_slice(records).map_err(|_| OpenError::BadHeader)?;
+        check_padding(bytes, meta_end, records_start)?;
+
+        let (meta, camera_meta) =
+            postcard::take_from_bytes::<Meta<'a>>(meta_bytes).map_err(|_| OpenError::BadMeta)?;
+        let blob = Self {
+            bytes,
+            words,
+            records,
+            identity: meta.identity.try_into().map_err(|_| OpenError::BadMeta)?,
+            frame: meta.frame,
+            written_by: meta.written_by,
+            camera_meta,
+            self_tests: SelfTests {
+                bytes: &[],
+                left: 0,
+            },
+            max_error_px: meta.max_error_px,
+            working_distance_mm: meta.working_distance_mm,
+        };
+        let is_positive = |x: f32| x > 0.0 && x.is_finite();
+        if !(is_positive(meta.max_error_px) && is_positive(meta.working_distance_mm)) {
+            return Err(OpenError::BadMeta);
+        }
+        let self_test_bytes = blob.check_cameras(tables_start)?;
+        check_self_tests(self_test_bytes, meta.self_test_count, header.camera_count)?;
+        Ok(Self {
+            self_tests: SelfTests {
+                bytes: self_test_bytes,
+                left: meta.self_test_count,
+            },
+            ..blob
+        })
+    }
+
+    /// Length that the header states, bytes, if magic and version are right: how much of a longer
+    /// slice (a flash sector) to give to [`RayBlob::open`]. Nothing else is checked.
+    ///
+    /// # Errors
+    /// [`OpenError::Truncated`] below the size of a header, [`OpenError::BadMagic`],
+    /// [`OpenError::WrongVersion`].
+    pub fn stated_len(bytes: &[u8]) -> Result<u32, OpenError> {
+        Ok(recognized_header(bytes)?.total_len)
+    }
+
+    /// How many cameras there are.
+    pub const fn camera_count(&self) -> usize {
+        self.records.len()
+    }
+
+    /// What the blob says of a camera; `None` if there is no such camera.
+    pub fn camera(&self, camera: usize) -> Option<Camera<'a>> {
+        let record = Record(self.records.get(camera)?);
+        let meta = self.camera_metas().nth(camera)?;
+        Some(Camera::new(&meta, record))
+    }
+
+    /// The index of the camera with this name.
+    pub fn camera_index(&self, name: &str) -> Option<usize> {
+        self.camera_metas().position(|meta| meta.name == name)
+    }
+
+    /// First 16 bytes of the hash that identifies the calibration.
+    pub const fn identity(&self) -> &'a [u8; IDENTITY_LEN] {
+        self.identity
+    }
+
+    /// The frame of rays and points, in words.
+    pub const fn frame(&self) -> &'a str {
+        self.frame
+    }
+
+    /// Program and version that wrote the blob.
+    pub const fn written_by(&self) -> &'a str {
+        self.written_by
+    }
+
+    /// No pixel in the calibrated area is further than this from the field that was packed, px.
+    pub const fn max_error_px(&self) -> f32 {
+        self.max_error_px
+    }
+
+    /// The distance for which [`max_error_px`](Self::max_error_px) holds if a camera is not
+    /// central, mm.
+    pub const fn working_distance_mm(&self) -> f32 {
+        self.working_distance_mm
+    }
+
+    /// Length of the blob, bytes.
+    pub const fn len(&self) -> usize {
+        self.bytes.len()
+    }
+
+    /// Whether the blob has no bytes: never.
+    pub const fn is_empty(&self) -> bool {
+        self.bytes.is_empty()
+    }
+
+    /// Questions whose answers' bits are known.
+    pub const fn self_tests(&self) -> SelfTests<'a> {
+        self.self_tests
+    }
+
+    /// What the pixel of a camera sees, rig frame.
+    ///
+    /// # Errors
+    /// [`LookupError::Outside`], [`LookupError::NoSuchCamera`].
+    pub fn lookup(&self, camera: usize, pixel: PixelPoint) -> Result<Ray, LookupError> {
+        lookup::lookup(self.bytes, self.words, self.record(camera)?, pixel)
+    }
+
+    /// Whether the pixel of a camera has a ray.
+    pub fn is_calibrated(&self, camera: usize, pixel: PixelPoint) -> bool {
+        self.record(camera)
+            .is_ok_and(|record| lookup::is_calibrated(self.bytes, record, pixel))
+    }
+
+    /// The point that two cameras see: the midpoint of the common perpendicular of their rays.
+    ///
+    /// # Errors
+    /// Any [`MeasureError`] but `TooFewRays`.
+    pub fn triangulate(
+        &self,
+        a: (usize, PixelPoint),
+        b: (usize, PixelPoint),
+    ) -> Result<Triangulation, MeasureError> {
+        triangulate::triangulate_pair(&self.sighting(a)?, &self.sighting(b)?)
+    }
+
+    /// The point nearest to the rays of any number of cameras, by least squares. Two give the
+    /// bits of [`RayBlob::triangulate`].
+    ///
+    /// Nothing is stored, so each ray is looked up about five times if there are more than two.
+    ///
+    /// # Errors
+    /// Any [`MeasureError`].
+    pub fn triangulate_many(
+        &self,
+        sightings: &[(usize, PixelPoint)],
+    ) -> Result<Triangulation, MeasureError> {
+        triangulate::triangulate_many(sightings.len(), |k| match sightings.get(k) {
+            Some(&sighting) => self.sighting(sighting),
+            None => Err(MeasureError::TooFewRays { have: k }),
+        })
+    }
+
+    fn sighting(&self, (camera, pixel): (usize, PixelPoint)) -> Result<Ray, MeasureError> {
+        self.lookup(camera, pixel)
+            .map_err(|error| MeasureError::of_lookup(error, camera))
+    }
+
+    fn record(&self, camera: usize) -> Result<Record<'a>, LookupError> {
+        self.records
+            .get(camera)
+            .map(Record)
+            .ok_or(LookupError::NoSuchCamera {
+                camera,
+                count: self.records.len(),
+            })
+    }
+
+    fn camera_metas(&self) -> impl Iterator<Item = CameraMeta<'a>> {
+        let mut rest = self.camera_meta;
+        self.records.iter().map_while(move |_| {
+            let (meta, after) = postcard::take_from_bytes(rest).ok()?;
+            rest = after;
+            Some(meta)
+        })
+    }
+
+    /// Checks every camera and its tables; what is left of the metadata behind the cameras.
+    fn check_cameras(&self, tables_start: usize) -> Result<&'a [u8], OpenError> {
+        let mut rest = self.camera_meta;
+        let mut end = tables_start;
+        for (camera, words) in self.records.iter().enumerate() {
+            let (meta, after) = postcard::take_from_bytes::<CameraMeta<'a>>(rest)
+                .map_err(|_| OpenError::BadMeta)?;
+            rest = after;
+            let is_first = self.camera_index(meta.name) == Some(camera);
+            if meta.name.is_empty() || !is_first || !is_region_on_sensor(&meta) {
+                return Err(OpenError::BadMeta);
+            }
+            end = self.check_camera(camera as u16, &meta, Record(words), end)?;
+        }
+        if end == self.bytes.len() {
+            Ok(rest)
+        } else {
+            Err(OpenError::BadHeader)
+        }
+    }
+
+    /// Checks a camera's record and tables, which must start at `start`; where they end.
+    fn check_camera(
+        &self,
+        camera: u16,
+        meta: &CameraMeta<'_>,
+        record: Record<'_>,
+        start: usize,
+    ) -> Result<usize, OpenError> {
+        let layout = |table| OpenError::BadLayout { camera, table };
+        let number = |table| OpenError::BadNumber { camera, table };
+
+        let encoding =
+            Encoding::from_number(record.encoding()).ok_or(OpenError::UnknownEncoding {
+                camera,
+                found: record.encoding(),
+            })?;
+        let (cells, mask_cells) = (record.cells(), record.mask_cells());
+        let is_count = |count: &u32| (1..=MAX_CELLS).contains(count);
+        if !(cells.iter().chain(&mask_cells).all(is_count) && record.reserved() == 0) {
+            return Err(layout(Table::Record));
+        }
+        let [axis_u, axis_v] = [
+            Axis::new(meta.region_u, meta.region_width, cells[0], mask_cells[0]),
+            Axis::new(meta.region_v, meta.region_height, cells[1], mask_cells[1]),
+        ];
+        if !(same_bits(axis_u, record.axis_u())
+            && same_bits(axis_v, record.axis_v())
+            && is_rotation(record.rotation())
+            && record.translation_mm().iter().all(is_moderate))
+        {
+            return Err(number(Table::Record));
+        }
+
+        let grid_end = start.saturating_add(format::grid_len(encoding, cells));
+        let grid = self
+            .words
+            .get(start / 4..grid_end / 4)
+            .filter(|_| record.grid_offset() as usize == start)
+            .ok_or(layout(Table::Grid))?;
+        if !grid.iter().all(is_moderate) {
+            return Err(number(Table::Grid));
+        }
+
+        let mask_start = format::aligned(grid_end);
+        let mask_end = mask_start.saturating_add(format::mask_len(mask_cells));
+        let end = format::aligned(mask_end);
+        check_padding(self.bytes, grid_end, mask_start)?;
+        let mask = self
+            .bytes
+            .get(mask_start..mask_end)
+            .filter(|_| record.mask_offset() as usize == mask_start)
+            .ok_or(layout(Table::Mask))?;
+        // Bits behind the last cell.
+        let used = (mask_cells[0] * mask_cells[1]) & 7;
+        let is_padded = used == 0 || mask.last().is_some_and(|last| last >> used == 0);
+        if !is_padded {
+            return Err(number(Table::Mask));
+        }
+        if self.bytes.len() < end {
+            return Err(layout(Table::Mask));
+        }
+        check_padding(self.bytes, mask_end, end)?;
+        Ok(end)
+    }
+}
+
+/// The header, if magic and version are right.
+fn recognized_header(bytes: &[u8]) -> Result<Header, OpenError> {
+    let (magic, header) = Header::read(bytes).ok_or(OpenError::Truncated {
+        need: HEADER_LEN as u32,
+        have: bytes.len() as u32,
+    })?;
+    if magic != MAGIC {
+        return Err(OpenError::BadMagic {
+            found: u32::from_le_bytes(magic),
+        });
+    }
+    if header.version != VERSION {
+        return Err(OpenError::WrongVersion {
+            found: header.version,
+            supported: VERSION,
+        });
+    }
+    Ok(header)
+}
+
+/// The header of bytes that have the length and the checksum it states.
+fn checked_header(bytes: &[u8]) -> Result<Header, OpenError> {
+    let header = recognized_header(bytes)?;
+    let (need, have) = (
+        header.total_len,
+        u32::try_from(bytes.len()).unwrap_or(u32::MAX),
+    );
+    if have < need {
+        return Err(OpenError::Truncated { need, have });
+    }
+    if have > need {
+        return Err(OpenError::TrailingBytes { need, have });
+    }
+    let computed = format::checksum(bytes).ok_or(OpenError::BadHeader)?;
+    if computed != header.crc {
+        return Err(OpenError::BadCrc {
+            stated: header.crc,
+            computed,
+        });
+    }
+    let reserved = bytes.get(HEADER_LEN - 2..HEADER_LEN);
+    if usize::from(header.header_len) != HEADER_LEN
+        || reserved != Some(&[0, 0])
+        || !bytes.len().is_multiple_of(ALIGNMENT)
+        || !(1..=MAX_CAMERAS).contains(&header.camera_count)
+    {
+        return Err(OpenError::BadHeader);
+    }
+    Ok(header)
+}
+
+fn check_padding(bytes: &[u8], start: usize, end: usize) -> Result<(), OpenError> {
+    bytes
+        .get(start..end)
+        .filter(|padding| padding.iter().all(|byte| *byte == 0))
+        .map(|_| ())
+        .ok_or(OpenError::BadPadding { at: start as u32 })
+}
+
+/// Checks that there are as many self-tests as stated, of cameras that exist, and nothing else.
+fn check_self_tests(bytes: &[u8], count: u16, camera_count: u16) -> Result<(), OpenError> {
+    let mut rest = bytes;
+    for _ in 0..count {
+        let (test, after) =
+            postcard::take_from_bytes::<SelfTest>(rest).map_err(|_| OpenError::BadMeta)?;
+        rest = after;
+        let has_cameras = match test {
+            SelfTest::Ray { camera, .. } => camera < camera_count,
+            SelfTest::Pair { cameras, .. } => cameras.iter().all(|c| *c < camera_count),
+        };
+        if !has_cameras {
+            return Err(OpenError::BadMeta);
+        }
+    }
+    if rest.is_empty() {
+        Ok(())
+    } else {
+        Err(OpenError::BadMeta)
+    }
+}
+
+fn is_region_on_sensor(meta: &CameraMeta<'_>) -> bool {
+    let fits = |first: u32, extent: u32, sensor: u32| {
+        sensor <= MAX_EXTENT_PX && extent >= 1 && first <= sensor && extent <= sensor - first
+    };
+    fits(meta.region_u, meta.region_width, meta.sensor_width)
+        && fits(meta.region_v, meta.region_height, meta.sensor_height)
+}
+
+fn is_moderate(x: &f32) -> bool {
+    // NaN is in no range.
+    (-MAX_MAGNITUDE..=MAX_MAGNITUDE).contains(x)
+}
+
+fn same_bits(a: Axis, b: Axis) -> bool {
+    let (a, b) = (a.to_numbers(), b.to_numbers());
+    a.iter().zip(&b).all(|(a, b)| a.to_bits() == b.to_bits())
+}
+
+/// Whether the rows are orthonormal and right-handed to within the round-off of f32 entries.
+fn is_rotation([a, b, c, d, e, f, g, h, i]: [f32; 9]) -> bool {
+    const TOLERANCE: f32 = 1e-5;
+    let [x, y, z] = [[a, b, c], [d, e, f], [g, h, i]].map(nalgebra::Vector3::from);
+    // NaN is near nothing.
+    let is_near = |value: f32, goal: f32| (goal - TOLERANCE..=goal + TOLERANCE).contains(&value);
+    is_near(x.norm_squared(), 1.0)
+        && is_near(y.norm_squared(), 1.0)
+        && is_near(z.norm_squared(), 1.0)
+        && is_near(x.dot(&y), 0.0)
+        && is_near(y.dot(&z), 0.0)
+        && is_near(z.dot(&x), 0.0)
+        && is_near(x.cross(&y).dot(&z), 1.0)
+}

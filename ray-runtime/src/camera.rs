@@ -1,0 +1,71 @@
+//! What a blob says of one camera.
+
+use crate::format::{CameraMeta, Encoding, Record};
+use nalgebra::{Matrix3, Vector3};
+
+/// A camera of a blob.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Camera<'a> {
+    /// Unique in the blob.
+    pub name: &'a str,
+    /// Columns of the sensor, px.
+    pub sensor_width: u32,
+    /// Rows of the sensor, px.
+    pub sensor_height: u32,
+    /// The part of the sensor that the control grid covers.
+    pub region: Region,
+    /// Whether all rays start in one point.
+    pub is_central: bool,
+    /// Cells of the control grid along u and v.
+    pub cells: [u32; 2],
+    /// Cells of the mask along u and v.
+    pub mask_cells: [u32; 2],
+    /// Where the camera is.
+    pub rig_from_camera: RigFromCamera,
+}
+
+/// A rectangle of sensor pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Region {
+    /// First column, px.
+    pub u: u32,
+    /// First row, px.
+    pub v: u32,
+    /// Columns, px.
+    pub width: u32,
+    /// Rows, px.
+    pub height: u32,
+}
+
+/// `point_in_rig = rotation * point_in_camera + translation_mm`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RigFromCamera {
+    /// Orthonormal to f32 round-off.
+    pub rotation: Matrix3<f32>,
+    /// The camera's reference point in the rig frame, mm.
+    pub translation_mm: Vector3<f32>,
+}
+
+impl<'a> Camera<'a> {
+    pub(crate) fn new(meta: &CameraMeta<'a>, record: Record<'_>) -> Self {
+        let [r11, r12, r13, r21, r22, r23, r31, r32, r33] = record.rotation();
+        Self {
+            name: meta.name,
+            sensor_width: meta.sensor_width,
+            sensor_height: meta.sensor_height,
+            region: Region {
+                u: meta.region_u,
+                v: meta.region_v,
+                width: meta.region_width,
+                height: meta.region_height,
+            },
+            is_central: Encoding::from_number(record.encoding()) == Some(Encoding::CentralF32),
+            cells: record.cells(),
+            mask_cells: record.mask_cells(),
+            rig_from_camera: RigFromCamera {
+                rotation: Matrix3::new(r11, r12, r13, r21, r22, r23, r31, r32, r33),
+                translation_mm: record.translation_mm().into(),
+            },
+        }
+    }
+}

@@ -1,0 +1,29 @@
+//! What goes in and what comes out: a pixel, and the line in space that it sees.
+
+use nalgebra::Vector3;
+
+/// A point on the sensor, px: the center of the top-left pixel is (0, 0), u right, v down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PixelPoint {
+    /// To the right.
+    pub u: f32,
+    /// Down.
+    pub v: f32,
+}
+
+impl PixelPoint {
+    /// The point (u, v), px.
+    pub const fn new(u: f32, v: f32) -> Self {
+        Self { u, v }
+    }
+}
+
+/// The points `origin_mm + lambda * direction`, lambda > 0 in front of the camera; rig frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ray {
+    /// The point of the ray nearest to its camera's reference point (its foot point), mm. The
+    /// rays of a central camera all start in the same point.
+    pub origin_mm: Vector3<f32>,
+    /// From the camera into the scene, not normalized: its length is between 4 and 20.
+    pub direction: Vector3<f32>,
+}

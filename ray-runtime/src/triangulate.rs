@@ -1,0 +1,231 @@
+//! Where rays meet: the midpoint of the common perpendicular, and least squares for more rays.
+//!
+//! Plain f32 multiplications and additions in a fixed order and one division for a pair, so that
+//! every target gives the same bits.
+
+use crate::{MeasureError, Ray};
+use nalgebra::{Matrix3, Vector3};
+
+/// Two rays closer to parallel than this sine have no usable intersection. The host's f64
+/// triangulation uses the same number.
+pub const MIN_PARALLAX_SIN: f32 = 2e-4;
+
+const MIN_PARALLAX_SIN_SQUARED: f32 = MIN_PARALLAX_SIN * MIN_PARALLAX_SIN;
+
+/// A triangulated point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Triangulation {
+    /// Rig frame, mm.
+    pub point_mm: Vector3<f32>,
+    /// Square of the gap, mm2. Two rays: the gap is the length of their common perpendicular.
+    /// More rays: twice the RMS distance of the point from them, which is the same for two.
+    pub gap_squared_mm2: f32,
+}
+
+impl Triangulation {
+    /// The gap, mm.
+    pub fn gap_mm(&self) -> f32 {
+        libm::sqrtf(self.gap_squared_mm2)
+    }
+}
+
+/// Midpoint of the common perpendicular of two rays.
+///
+/// # Errors
+/// [`MeasureError::Parallel`] (also for rays that are not finite), [`MeasureError::Behind`].
+pub fn triangulate_pair(a: &Ray, b: &Ray) -> Result<Triangulation, MeasureError> {
+    let (d1, d2) = (a.direction, b.direction);
+    let w = b.origin_mm - a.origin_mm;
+    let normal = d1.cross(&d2);
+    let normal_squared = normal.norm_squared();
+    if !is_wide(normal_squared, &d1, &d2) {
+        return Err(MeasureError::Parallel);
+    }
+    let inverse = 1.0 / normal_squared;
+    let lambda1 = w.cross(&d2).dot(&normal) * inverse;
+    let lambda2 = w.cross(&d1).dot(&normal) * inverse;
+    if !(lambda1 > 0.0 && lambda2 > 0.0) {
+        return Err(MeasureError::Behind);
+    }
+    let along = w.dot(&normal);
+    Ok(Triangulation {
+        point_mm: ((a.origin_mm + d1 * lambda1) + (b.origin_mm + d2 * lambda2)) * 0.5,
+        gap_squared_mm2: along * along * inverse,
+    })
+}
+
+/// Whether the sine between two directions is large enough; NaN counts as parallel.
+fn is_wide(normal_squared: f32, d1: &Vector3<f32>, d2: &Vector3<f32>) -> bool {
+    normal_squared > MIN_PARALLAX_SIN_SQUARED * (d1.norm_squared() * d2.norm_squared())
+}
+
+/// The point nearest to `count` rays in the least-squares sense; `ray` gives each when asked, any
+/// number of times, so that nothing needs to be stored.
+///
+/// The normal equations are solved for the step from a point that two of the rays give: in f32
+/// their solution proper would lose the digits that a step keeps.
+pub(crate) fn triangulate_many(
+    count: usize,
+    ray: impl Fn(usize) -> Result<Ray, MeasureError>,
+) -> Result<Triangulation, MeasureError> {
+    if count < 2 {
+        return Err(MeasureError::TooFewRays { have: count });
+    }
+    if count == 2 {
+        return triangulate_pair(&ray(0)?, &ray(1)?);
+    }
+    let mut point = start(count, &ray)?;
+    for _ in 0..STEPS {
+        point += step(count, &ray, &point)?;
+    }
+    let mut distance_squared = 0.0;
+    for k in 0..count {
+        let ray = ray(k)?;
+        let offset = point - ray.origin_mm;
+        let along = offset.dot(&ray.direction);
+        // Written so that NaN counts as behind.
+        if !(along > 0.0) {
+            return Err(MeasureError::Behind);
+        }
+        let across = offset - ray.direction * (along / ray.direction.norm_squared());
+        distance_squared += across.norm_squared();
+    }
+    Ok(Triangulation {
+        point_mm: point,
+        gap_squared_mm2: 4.0 * distance_squared / count as f32,
+    })
+}
+
+/// Gauss-Newton steps on a linear problem: the second removes the round-off of the first.
+const STEPS: usize = 2;
+
+/// Where the widest pair of rays that has the first ray in it meets; if all of those are parallel,
+/// where any other pair does.
+fn start(
+    count: usize,
+    ray: &impl Fn(usize) -> Result<Ray, MeasureError>,
+) -> Result<Vector3<f32>, MeasureError> {
+    // Every ray must exist before any is judged.
+    for k in 0..count {
+        ray(k)?;
+    }
+    for i in 0..count {
+        let a = ray(i)?;
+        let mut widest: Option<(f32, Ray)> = None;
+        for k in i + 1..count {
+            let b = ray(k)?;
+            let normal_squared = a.direction.cross(&b.direction).norm_squared();
+            let sin_squared = normal_squared / b.direction.norm_squared();
+            if is_wide(normal_squared, &a.direction, &b.direction)
+                && widest.is_none_or(|(widest, _)| sin_squared > widest)
+            {
+                widest = Some((sin_squared, b));
+            }
+        }
+        if let Some((_, b)) = widest {
+            return Ok(nearest_of_pair(&a, &b));
+        }
+    }
+    Err(MeasureError::Parallel)
+}
+
+/// Midpoint of two rays' common perpendicular, wherever it lies.
+fn nearest_of_pair(a: &Ray, b: &Ray) -> Vector3<f32> {
+    let w = b.origin_mm - a.origin_mm;
+    let normal = a.direction.cross(&b.direction);
+    let inverse = 1.0 / normal.norm_squared();
+    let lambda1 = w.cross(&b.direction).dot(&normal) * inverse;
+    let lambda2 = w.cross(&a.direction).dot(&normal) * inverse;
+    ((a.origin_mm + a.direction * lambda1) + (b.origin_mm + b.direction * lambda2)) * 0.5
+}
+
+/// The step from `point` to the least-squares point.
+fn step(
+    count: usize,
+    ray: &impl Fn(usize) -> Result<Ray, MeasureError>,
+    point: &Vector3<f32>,
+) -> Result<Vector3<f32>, MeasureError> {
+    let mut normal = Matrix3::zeros();
+    let mut right = Vector3::zeros();
+    for k in 0..count {
+        let ray = ray(k)?;
+        let d = ray.direction;
+        let inverse = 1.0 / d.norm_squared();
+        let offset = ray.origin_mm - point;
+        normal += Matrix3::identity() - d * (d * inverse).transpose();
+        right += offset - d * (offset.dot(&d) * inverse);
+    }
+    normal
+        .try_inverse()
+        .map(|inverse| inverse * right)
+        .ok_or(MeasureError::Parallel)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ray(origin: [f32; 3], direction: [f32; 3]) -> Ray {
+        Ray {
+            origin_mm: origin.into(),
+            direction: direction.into(),
+        }
+    }
+
+    fn many(rays: &[Ray]) -> Result<Triangulation, MeasureError> {
+        triangulate_many(rays.len(), |k| Ok(rays[k]))
+    }
+
+    #[test]
+    fn skew_lines_meet_midway_between_them() {
+        // Along x at z = 0 and along y at z = 2: nearest at (1, 0, 0) and (1, 0, 2).
+        let a = ray([0.0, 0.0, 0.0], [1.0, 0.0, 0.0]);
+        let b = ray([1.0, -1.0, 2.0], [0.0, 3.0, 0.0]);
+        let result = triangulate_pair(&a, &b).unwrap();
+        assert_eq!(result.point_mm, Vector3::new(1.0, 0.0, 1.0));
+        assert_eq!(result.gap_squared_mm2, 4.0);
+        assert_eq!(result.gap_mm(), 2.0);
+    }
+
+    #[test]
+    fn parallel_behind_and_nan_are_refused() {
+        let a = ray([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]);
+        let parallel = ray([10.0, 0.0, 0.0], [0.0, 0.0, 2.0]);
+        let diverging = ray([10.0, 0.0, 0.0], [0.1, 0.0, 1.0]);
+        let third = ray([0.0, 10.0, 0.0], [0.0, 0.1, 1.0]);
+        let nan = ray([0.0, 0.0, 0.0], [f32::NAN, 0.0, 1.0]);
+        assert_eq!(triangulate_pair(&a, &parallel), Err(MeasureError::Parallel));
+        assert_eq!(triangulate_pair(&a, &nan), Err(MeasureError::Parallel));
+        assert_eq!(triangulate_pair(&a, &diverging), Err(MeasureError::Behind));
+        assert_eq!(many(&[a, diverging, third]), Err(MeasureError::Behind));
+        assert_eq!(many(&[a, parallel, a]), Err(MeasureError::Parallel));
+        assert_eq!(many(&[a]), Err(MeasureError::TooFewRays { have: 1 }));
+        assert_eq!(many(&[]), Err(MeasureError::TooFewRays { have: 0 }));
+    }
+
+    #[test]
+    fn three_rays_through_one_point_meet_there() {
+        let target = Vector3::new(10.0, -20.0, 300.0);
+        let rays = [[0.0, 0.0, 0.0], [100.0, 0.0, 0.0], [0.0, 80.0, 5.0]].map(|o| {
+            let origin_mm = Vector3::from(o);
+            Ray {
+                origin_mm,
+                direction: target - origin_mm,
+            }
+        });
+        let result = many(&rays).unwrap();
+        // 300 mm in f32: 3e-5 mm a digit.
+        assert!((result.point_mm - target).norm() < 1e-4);
+        assert!(result.gap_mm() < 1e-4);
+    }
+
+    #[test]
+    fn a_first_ray_parallel_to_all_others_does_not_hide_a_wide_pair() {
+        // Against the first: 1.8e-4 to either side; against each other: 3.6e-4.
+        let a = ray([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]);
+        let b = ray([-1.0, 0.0, 0.0], [1.8e-4, 0.0, 1.0]);
+        let c = ray([1.0, 0.0, 0.0], [-1.8e-4, 0.0, 1.0]);
+        let point = many(&[a, b, c]).unwrap().point_mm;
+        assert!((point.z - 5555.6).abs() < 5.0, "{point}");
+    }
+}
