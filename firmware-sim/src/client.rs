@@ -61,7 +61,9 @@ pub enum ClientError {
         timeout: Duration,
     },
     /// The device speaks another version of the protocol.
-    #[error("the device speaks protocol version {device}, this program version {ours}: bring the older one up to date")]
+    #[error(
+        "the device speaks protocol version {device}, this program version {ours}: bring the older one up to date"
+    )]
     WrongVersion {
         /// The device's version.
         device: u8,
@@ -88,7 +90,7 @@ pub enum ClientError {
 /// use firmware_sim::client::DeviceClient;
 /// use firmware_sim::host::SimulatedDevice;
 ///
-/// let device = SimulatedDevice::start("127.0.0.1:0".parse()?, Vec::new())?;
+/// let device = SimulatedDevice::start("127.0.0.1:0".parse()?, &[])?;
 /// let mut client = DeviceClient::connect(&format!("tcp:{}", device.address()))?;
 /// assert_eq!(client.hello()?.device, "firmware-sim host");
 /// assert!(client.status()?.blob.is_err(), "its flash is empty");
@@ -120,13 +122,21 @@ impl DeviceClient {
     /// # Errors
     /// [`ClientError`].
     pub fn connect_within(address: &str, timeout: Duration) -> Result<Self, ClientError> {
-        let unknown = || ClientError::UnknownAddress { address: address.to_owned() };
+        let unknown = || ClientError::UnknownAddress {
+            address: address.to_owned(),
+        };
         let host_and_port = address.strip_prefix("tcp:").ok_or_else(unknown)?;
-        if host_and_port.rsplit_once(':').is_none_or(|(_, port)| port.parse::<u16>().is_err()) {
+        if host_and_port
+            .rsplit_once(':')
+            .is_none_or(|(_, port)| port.parse::<u16>().is_err())
+        {
             return Err(unknown());
         }
-        let stream = connect_tcp(host_and_port, timeout)
-            .map_err(|source| ClientError::Connect { address: address.to_owned(), source })?;
+        let stream =
+            connect_tcp(host_and_port, timeout).map_err(|source| ClientError::Connect {
+                address: address.to_owned(),
+                source,
+            })?;
         let mut client = Self {
             address: address.to_owned(),
             stream,
@@ -184,14 +194,27 @@ impl DeviceClient {
                 let batch_on_wire = batch.iter().copied().collect();
                 under_way.push_back((self.send(&Request::Measure(batch_on_wire))?, batch));
             }
-            let Some((sequence, batch)) = under_way.pop_front() else { break };
+            let Some((sequence, batch)) = under_way.pop_front() else {
+                break;
+            };
             let answers = match self.receive(sequence)? {
                 Reply::Measured(answers) => answers,
                 reply => return Err(unexpected("measure", &reply)),
             };
-            if !answers.iter().map(|answer| answer.id).eq(batch.iter().map(|asked| asked.id)) {
-                let found = format!("{} matches asked, {} answers with other ids", batch.len(), answers.len());
-                return Err(ClientError::BadReply { asked: "measure", found });
+            if !answers
+                .iter()
+                .map(|answer| answer.id)
+                .eq(batch.iter().map(|asked| asked.id))
+            {
+                let found = format!(
+                    "{} matches asked, {} answers with other ids",
+                    batch.len(),
+                    answers.len()
+                );
+                return Err(ClientError::BadReply {
+                    asked: "measure",
+                    found,
+                });
             }
             measured.extend_from_slice(&answers);
         }
@@ -204,12 +227,24 @@ impl DeviceClient {
         let deadline = Instant::now() + self.timeout;
         loop {
             match self.next_frame(deadline)? {
-                Ok(Received { sequence: found, body: Reply::Hello(hello) }) if found == sequence => return Ok(hello),
-                Ok(Received { sequence: found, body: Reply::Refused(refusal) }) if found == sequence => {
+                Ok(Received {
+                    sequence: found,
+                    body: Reply::Hello(hello),
+                }) if found == sequence => return Ok(hello),
+                Ok(Received {
+                    sequence: found,
+                    body: Reply::Refused(refusal),
+                }) if found == sequence => {
                     return Err(refused(refusal));
                 }
-                Err(Rejected { refusal: Refusal::WrongVersion { found, supported }, .. }) => {
-                    return Err(ClientError::WrongVersion { device: found, ours: supported });
+                Err(Rejected {
+                    refusal: Refusal::WrongVersion { found, supported },
+                    ..
+                }) => {
+                    return Err(ClientError::WrongVersion {
+                        device: found,
+                        ours: supported,
+                    });
                 }
                 Ok(_) | Err(_) => {}
             }
@@ -235,19 +270,34 @@ impl DeviceClient {
     fn receive(&mut self, sequence: u16) -> Result<Reply, ClientError> {
         let deadline = Instant::now() + self.timeout;
         match self.next_frame(deadline)? {
-            Ok(Received { body: Reply::Refused(refusal), .. }) => Err(refused(refusal)),
-            Ok(Received { sequence: found, body }) if found == sequence => Ok(body),
-            Ok(Received { sequence: found, .. }) => {
+            Ok(Received {
+                body: Reply::Refused(refusal),
+                ..
+            }) => Err(refused(refusal)),
+            Ok(Received {
+                sequence: found,
+                body,
+            }) if found == sequence => Ok(body),
+            Ok(Received {
+                sequence: found, ..
+            }) => {
                 let found = format!("number {found} was answered instead of {sequence}");
-                Err(ClientError::BadReply { asked: "a request", found })
+                Err(ClientError::BadReply {
+                    asked: "a request",
+                    found,
+                })
             }
-            Err(Rejected { refusal, .. }) => {
-                Err(ClientError::BadReply { asked: "a request", found: refusal.to_string() })
-            }
+            Err(Rejected { refusal, .. }) => Err(ClientError::BadReply {
+                asked: "a request",
+                found: refusal.to_string(),
+            }),
         }
     }
 
-    fn next_frame(&mut self, deadline: Instant) -> Result<Result<Received<Reply>, Rejected>, ClientError> {
+    fn next_frame(
+        &mut self,
+        deadline: Instant,
+    ) -> Result<Result<Received<Reply>, Rejected>, ClientError> {
         loop {
             while let Some(byte) = self.arrived.pop_front() {
                 if let Some(frame) = self.reader.push(byte) {
@@ -259,11 +309,20 @@ impl DeviceClient {
                 return Err(self.timed_out());
             }
             let mut buffer = [0; 8192];
-            let read = self.stream.set_read_timeout(Some(remaining)).and_then(|()| self.stream.read(&mut buffer));
+            let read = self
+                .stream
+                .set_read_timeout(Some(remaining))
+                .and_then(|()| self.stream.read(&mut buffer));
             match read {
-                Ok(0) => return Err(ClientError::Closed { address: self.address.clone() }),
+                Ok(0) => {
+                    return Err(ClientError::Closed {
+                        address: self.address.clone(),
+                    });
+                }
                 Ok(count) => self.arrived.extend(&buffer[..count]),
-                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+                Err(error)
+                    if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) =>
+                {
                     return Err(self.timed_out());
                 }
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
@@ -273,17 +332,25 @@ impl DeviceClient {
     }
 
     fn send_bytes(&mut self, bytes: &[u8]) -> Result<(), ClientError> {
-        self.stream.write_all(bytes).map_err(|source| self.broken(source))
+        self.stream
+            .write_all(bytes)
+            .map_err(|source| self.broken(source))
     }
 
     fn timed_out(&self) -> ClientError {
-        ClientError::Timeout { address: self.address.clone(), timeout: self.timeout }
+        ClientError::Timeout {
+            address: self.address.clone(),
+            timeout: self.timeout,
+        }
     }
 
     fn broken(&self, source: std::io::Error) -> ClientError {
         match source.kind() {
             ErrorKind::WouldBlock | ErrorKind::TimedOut => self.timed_out(),
-            _ => ClientError::Broken { address: self.address.clone(), source },
+            _ => ClientError::Broken {
+                address: self.address.clone(),
+                source,
+            },
         }
     }
 }
@@ -307,7 +374,10 @@ fn connect_tcp(host_and_port: &str, timeout: Duration) -> std::io::Result<TcpStr
 
 fn refused(refusal: Refusal) -> ClientError {
     match refusal {
-        Refusal::WrongVersion { found, supported } => ClientError::WrongVersion { device: supported, ours: found },
+        Refusal::WrongVersion { found, supported } => ClientError::WrongVersion {
+            device: supported,
+            ours: found,
+        },
         refusal => ClientError::Refused(refusal),
     }
 }
@@ -319,5 +389,8 @@ fn unexpected(asked: &'static str, reply: &Reply) -> ClientError {
         Reply::Status(_) => "an answer to status",
         Reply::Measured(_) => "an answer to measure",
     };
-    ClientError::BadReply { asked, found: found.to_owned() }
+    ClientError::BadReply {
+        asked,
+        found: found.to_owned(),
+    }
 }

@@ -95,8 +95,14 @@ mod tests {
         assert_eq!(encoded(&[]), [0x01]);
         assert_eq!(encoded(&[0x00]), [0x01, 0x01]);
         assert_eq!(encoded(&[0x00, 0x00]), [0x01, 0x01, 0x01]);
-        assert_eq!(encoded(&[0x11, 0x22, 0x00, 0x33]), [0x03, 0x11, 0x22, 0x02, 0x33]);
-        assert_eq!(encoded(&[0x11, 0x00, 0x00, 0x00]), [0x02, 0x11, 0x01, 0x01, 0x01]);
+        assert_eq!(
+            encoded(&[0x11, 0x22, 0x00, 0x33]),
+            [0x03, 0x11, 0x22, 0x02, 0x33]
+        );
+        assert_eq!(
+            encoded(&[0x11, 0x00, 0x00, 0x00]),
+            [0x02, 0x11, 0x01, 0x01, 0x01]
+        );
 
         let run_254: Vec<u8> = (1..=254).collect();
         let mut expected = vec![0xff];
@@ -132,7 +138,10 @@ mod tests {
                     *byte = 0;
                 }
                 let frame = encoded(&message);
-                assert!(!frame.contains(&0), "a zero inside the frame of {length} bytes");
+                assert!(
+                    !frame.contains(&0),
+                    "a zero inside the frame of {length} bytes"
+                );
                 assert_eq!(decoded(&frame).as_deref(), Some(&message[..]));
             }
         }
@@ -150,7 +159,11 @@ mod tests {
     #[test]
     fn what_is_no_encoding_is_refused() {
         assert_eq!(decoded(&[0x00]), None, "a zero code byte");
-        assert_eq!(decoded(&[0x03, 0x11]), None, "a block longer than the frame");
+        assert_eq!(
+            decoded(&[0x03, 0x11]),
+            None,
+            "a block longer than the frame"
+        );
         assert_eq!(decoded(&[0x03, 0x11, 0x00]), None, "a zero inside a block");
         assert_eq!(decoded(&[]), Some(vec![]));
     }

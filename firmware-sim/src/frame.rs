@@ -66,7 +66,10 @@ impl Default for FrameWriter {
 impl FrameWriter {
     /// An empty one.
     pub const fn new() -> Self {
-        Self { message: [0; MAX_MESSAGE], frame: [0; MAX_FRAME] }
+        Self {
+            message: [0; MAX_MESSAGE],
+            frame: [0; MAX_FRAME],
+        }
     }
 
     /// The frame of `body` with its delimiter, or `None` if the message is longer than [`MAX_MESSAGE`]: no
@@ -108,13 +111,20 @@ impl Default for FrameReader {
 impl FrameReader {
     /// An empty one.
     pub const fn new() -> Self {
-        Self { buffer: [0; MAX_FRAME], length: 0, overflowed: false }
+        Self {
+            buffer: [0; MAX_FRAME],
+            length: 0,
+            overflowed: false,
+        }
     }
 
     /// Takes in one byte. `None` while a frame is under way; at its delimiter the message, or why it is refused.
     ///
     /// A frame that does not fit is dropped up to its delimiter and then refused as oversized, once.
-    pub fn push<Body: DeserializeOwned>(&mut self, byte: u8) -> Option<Result<Received<Body>, Rejected>> {
+    pub fn push<Body: DeserializeOwned>(
+        &mut self,
+        byte: u8,
+    ) -> Option<Result<Received<Body>, Rejected>> {
         if byte != DELIMITER {
             match self.buffer.get_mut(self.length) {
                 Some(place) => {
@@ -127,8 +137,13 @@ impl FrameReader {
         }
         let length = core::mem::take(&mut self.length);
         if core::mem::take(&mut self.overflowed) {
-            let refusal = Refusal::Oversized { limit: MAX_FRAME as u16 };
-            return Some(Err(Rejected { sequence: NO_SEQUENCE, refusal }));
+            let refusal = Refusal::Oversized {
+                limit: MAX_FRAME as u16,
+            };
+            return Some(Err(Rejected {
+                sequence: NO_SEQUENCE,
+                refusal,
+            }));
         }
         if length == 0 {
             return None;
@@ -139,24 +154,35 @@ impl FrameReader {
 
 /// Takes the message out of a frame without its delimiter.
 fn open<Body: DeserializeOwned>(frame: &mut [u8]) -> Result<Received<Body>, Rejected> {
-    let unreadable = |refusal| Rejected { sequence: NO_SEQUENCE, refusal };
+    let unreadable = |refusal| Rejected {
+        sequence: NO_SEQUENCE,
+        refusal,
+    };
     let length = cobs::decode_in_place(frame).ok_or(unreadable(Refusal::BadFrame))?;
     let message = frame.get(..length).ok_or(unreadable(Refusal::BadFrame))?;
-    let (checked, checksum) =
-        message.split_last_chunk::<CHECKSUM_LENGTH>().ok_or(unreadable(Refusal::BadFrame))?;
-    let (&[version, low, high], body) =
-        checked.split_first_chunk::<HEAD_LENGTH>().ok_or(unreadable(Refusal::BadFrame))?;
+    let (checked, checksum) = message
+        .split_last_chunk::<CHECKSUM_LENGTH>()
+        .ok_or(unreadable(Refusal::BadFrame))?;
+    let (&[version, low, high], body) = checked
+        .split_first_chunk::<HEAD_LENGTH>()
+        .ok_or(unreadable(Refusal::BadFrame))?;
     if CHECKSUM.checksum(checked) != u32::from_le_bytes(*checksum) {
         return Err(unreadable(Refusal::BadChecksum));
     }
     let sequence = u16::from_le_bytes([low, high]);
     if version != PROTOCOL_VERSION {
-        let refusal = Refusal::WrongVersion { found: version, supported: PROTOCOL_VERSION };
+        let refusal = Refusal::WrongVersion {
+            found: version,
+            supported: PROTOCOL_VERSION,
+        };
         return Err(Rejected { sequence, refusal });
     }
     match postcard::take_from_bytes(body) {
         Ok((body, [])) => Ok(Received { sequence, body }),
-        _ => Err(Rejected { sequence, refusal: Refusal::UnknownMessage }),
+        _ => Err(Rejected {
+            sequence,
+            refusal: Refusal::UnknownMessage,
+        }),
     }
 }
 

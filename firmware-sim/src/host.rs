@@ -34,15 +34,22 @@ impl SimulatedDevice {
     ///
     /// # Errors
     /// If the address cannot be listened on, or `flash` is longer than [`FLASH_LENGTH`].
-    pub fn start(listen: SocketAddr, mut flash: Vec<u8>) -> std::io::Result<Self> {
-        if flash.len() > FLASH_LENGTH {
-            let reason = format!("{} bytes are more than the flash has, {FLASH_LENGTH}", flash.len());
-            return Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, reason));
-        }
-        flash.resize(FLASH_LENGTH, 0);
+    pub fn start(listen: SocketAddr, flash: &[u8]) -> std::io::Result<Self> {
+        let Some(flash) = Flash::with_contents(flash) else {
+            let reason = format!(
+                "{} bytes are more than the flash has, {FLASH_LENGTH}",
+                flash.len()
+            );
+            return Err(std::io::Error::new(
+                std::io::ErrorKind::InvalidInput,
+                reason,
+            ));
+        };
         let listener = TcpListener::bind(listen)?;
         let address = listener.local_addr()?;
-        let server = thread::Builder::new().name("device".into()).spawn(move || serve(&listener, Flash(flash)))?;
+        let server = thread::Builder::new()
+            .name("device".into())
+            .spawn(move || serve(&listener, &flash))?;
         Ok(Self { address, server })
     }
 
@@ -59,8 +66,8 @@ impl SimulatedDevice {
 }
 
 /// Accepts peers for good. All of them talk to the one device; each has its own session.
-fn serve(listener: &TcpListener, flash: Flash) {
-    let device = Device::boot("firmware-sim host", &flash, HostClock(Instant::now()));
+fn serve(listener: &TcpListener, flash: &Flash) {
+    let device = Device::boot("firmware-sim host", flash, HostClock(Instant::now()));
     let device = Mutex::new(device);
     let peers = AtomicUsize::new(0);
     thread::scope(|scope| {
@@ -88,11 +95,22 @@ fn converse(stream: TcpStream, device: &Mutex<Device<'_, HostClock>>) -> std::io
     Session::new().serve(&mut TcpLink(BufReader::new(stream)), &mut Shared(device))
 }
 
-struct Flash(Vec<u8>);
+/// Flash in memory: double words, because the runtime asks for a blob on a multiple of 8.
+struct Flash(Vec<u64>);
+
+impl Flash {
+    fn with_contents(contents: &[u8]) -> Option<Self> {
+        let mut words = vec![0; FLASH_LENGTH / 8];
+        bytemuck::cast_slice_mut(&mut words)
+            .get_mut(..contents.len())?
+            .copy_from_slice(contents);
+        Some(Self(words))
+    }
+}
 
 impl BlobStore for Flash {
     fn active_blob(&self) -> &[u8] {
-        &self.0
+        bytemuck::cast_slice(&self.0)
     }
 }
 
@@ -124,10 +142,16 @@ struct Shared<'a, 'f>(&'a Mutex<Device<'f, HostClock>>);
 
 impl Responder for Shared<'_, '_> {
     fn respond(&mut self, request: &Request) -> Reply {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).respond(request)
+        self.0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .respond(request)
     }
 
     fn note_refused(&mut self, refusal: Refusal) {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).note_refused(refusal);
+        self.0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .note_refused(refusal);
     }
 }

@@ -50,7 +50,8 @@ fn listen_address(text: &str) -> Result<SocketAddr, String> {
     if let Ok(port) = text.parse::<u16>() {
         return Ok(SocketAddr::from((Ipv4Addr::LOCALHOST, port)));
     }
-    text.parse().map_err(|_| "give ADDRESS:PORT, such as 127.0.0.1:7777, or a port alone".to_owned())
+    text.parse()
+        .map_err(|_| "give ADDRESS:PORT, such as 127.0.0.1:7777, or a port alone".to_owned())
 }
 
 fn main() -> ExitCode {
@@ -72,10 +73,12 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
 fn run_on_host(arguments: &DeviceArguments) -> anyhow::Result<()> {
     let flash = match &arguments.flash_file {
-        Some(path) => std::fs::read(path).with_context(|| format!("the flash file {}", path.display()))?,
+        Some(path) => {
+            std::fs::read(path).with_context(|| format!("the flash file {}", path.display()))?
+        }
         None => Vec::new(),
     };
-    let device = SimulatedDevice::start(arguments.listen, flash)
+    let device = SimulatedDevice::start(arguments.listen, &flash)
         .with_context(|| format!("the device on {}", arguments.listen))?;
     announce(device.address())?;
     device.serve_forever();
@@ -96,5 +99,7 @@ fn run_in_qemu(arguments: &DeviceArguments, image: Option<&Path>) -> anyhow::Res
 /// Says where the device can be reached. Whoever started this program may wait for the line, so it must get out.
 fn announce(address: SocketAddr) -> anyhow::Result<()> {
     let mut output = std::io::stdout();
-    writeln!(output, "listening on {address}").and_then(|()| output.flush()).context("standard output")
+    writeln!(output, "listening on {address}")
+        .and_then(|()| output.flush())
+        .context("standard output")
 }

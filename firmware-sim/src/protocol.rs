@@ -24,7 +24,7 @@ pub const MAX_CAMERAS_LISTED: usize = 8;
 pub const MAX_NAME: usize = 32;
 
 /// Length of a blob's identity, bytes.
-pub const IDENTITY_LENGTH: usize = ray_runtime::IDENTITY_LENGTH;
+pub const IDENTITY_LENGTH: usize = ray_runtime::format::IDENTITY_LEN;
 
 /// A name as it travels.
 pub type Name = String<MAX_NAME>;
@@ -181,6 +181,31 @@ pub fn name(text: &str) -> Name {
         }
     }
     name
+}
+
+impl core::fmt::Display for Refusal {
+    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Oversized { limit } => {
+                write!(formatter, "the frame is longer than {limit} bytes")
+            }
+            Self::BadFrame => write!(formatter, "the bytes are no frame"),
+            Self::BadChecksum => write!(formatter, "the frame was damaged on its way"),
+            Self::WrongVersion { found, supported } => {
+                write!(
+                    formatter,
+                    "the frame is of protocol version {found}, {supported} is spoken"
+                )
+            }
+            Self::UnknownMessage => write!(formatter, "the frame holds no known message"),
+            Self::NoBlob { open_error } => {
+                write!(
+                    formatter,
+                    "no calibration in its flash could be opened (code {open_error})"
+                )
+            }
+        }
+    }
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use std::io::ErrorKind;
 use std::net::{SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -23,10 +23,10 @@ const START_LIMIT: Duration = Duration::from_secs(30);
 const PORT_TRIES: usize = 5;
 
 /// Runs its arguments and ends them when standard input closes. The parent holds the other end, so they end with it
-/// however it ends, a kill included. QEMU's own output goes to standard error.
+/// however it ends, a kill included.
 const ENDS_WITH_PARENT: &str = r#"
 exec 3<&0
-"$@" </dev/null >&2 3<&- &
+"$@" </dev/null 3<&- &
 child=$!
 { read -r _ <&3; kill -KILL $child; } 2>/dev/null &
 watchdog=$!
@@ -41,7 +41,9 @@ exit $status
 #[non_exhaustive]
 pub enum QemuError {
     /// QEMU is not installed.
-    #[error("qemu-system-arm is not installed: apt-get install qemu-system-arm, or run scripts/install-embedded.sh")]
+    #[error(
+        "qemu-system-arm is not installed: apt-get install qemu-system-arm, or run scripts/install-embedded.sh"
+    )]
     NotInstalled,
     /// The sources of the image are not where this program was built.
     #[error("no sources for the image at {}: run from a checkout, or give an image with --image", path.display())]
@@ -105,7 +107,11 @@ impl QemuDevice {
     ///
     /// # Errors
     /// [`QemuError`].
-    pub fn start(listen: SocketAddr, image: &Path, flash_file: Option<&Path>) -> Result<Self, QemuError> {
+    pub fn start(
+        listen: SocketAddr,
+        image: &Path,
+        flash_file: Option<&Path>,
+    ) -> Result<Self, QemuError> {
         require_qemu()?;
         let tries = if listen.port() == 0 { PORT_TRIES } else { 1 };
         let mut tried = 1;
@@ -129,19 +135,33 @@ impl QemuDevice {
     pub fn wait(mut self) -> Result<ExitStatus, QemuError> {
         // `Child::wait` would close the pipe, which would end QEMU at once.
         let pipe = self.child.stdin.take();
-        let status = self.child.wait().map_err(|source| QemuError::Io { what: "waiting for QEMU".into(), source });
+        let status = self.child.wait().map_err(|source| QemuError::Io {
+            what: "waiting for QEMU".into(),
+            source,
+        });
         drop(pipe);
         status
     }
 
-    fn start_on(address: SocketAddr, image: &Path, flash_file: Option<&Path>) -> Result<Self, QemuError> {
+    fn start_on(
+        address: SocketAddr,
+        image: &Path,
+        flash_file: Option<&Path>,
+    ) -> Result<Self, QemuError> {
         let mut command = qemu_command(image, flash_file)?;
         command.args(["-monitor", "none"]);
-        command.args(["-serial", &format!("tcp:{address},server=on,wait=off,nodelay=on")]);
+        command.args([
+            "-serial",
+            &format!("tcp:{address},server=on,wait=off,nodelay=on"),
+        ]);
         let child = command
             .stdin(Stdio::piped())
+            .stdout(std::io::stderr())
             .spawn()
-            .map_err(|source| QemuError::Io { what: "starting QEMU through sh".into(), source })?;
+            .map_err(|source| QemuError::Io {
+                what: "starting QEMU through sh".into(),
+                source,
+            })?;
         let mut device = Self { child, address };
         device.wait_until_it_answers()?;
         Ok(device)
@@ -150,7 +170,9 @@ impl QemuDevice {
     fn wait_until_it_answers(&mut self) -> Result<(), QemuError> {
         let deadline = Instant::now() + START_LIMIT;
         loop {
-            let remaining = deadline.saturating_duration_since(Instant::now()).max(Duration::from_millis(1));
+            let remaining = deadline
+                .saturating_duration_since(Instant::now())
+                .max(Duration::from_millis(1));
             match DeviceClient::connect_within(&format!("tcp:{}", self.address), remaining) {
                 Ok(_) => return Ok(()),
                 Err(error) if Instant::now() >= deadline => return Err(QemuError::Silent(error)),
@@ -177,66 +199,129 @@ impl Drop for QemuDevice {
 /// # Errors
 /// [`QemuError`]; what to install if there is no toolchain is said on standard error.
 pub fn build_image(image: &str) -> Result<PathBuf, QemuError> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."));
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .unwrap_or(Path::new("."));
     let script = root.join("scripts/embedded-cargo.sh");
     if !script.is_file() {
-        return Err(QemuError::NoSources { path: root.join("firmware-sim/cortex-m") });
+        return Err(QemuError::NoSources {
+            path: root.join("firmware-sim/cortex-m"),
+        });
     }
     let status = Command::new(&script)
         .args(["build", "--quiet", "--locked", "--release", "--bin", image])
         .stdin(Stdio::null())
         .stdout(std::io::stderr())
         .status()
-        .map_err(|source| QemuError::Io { what: script.display().to_string(), source })?;
+        .map_err(|source| QemuError::Io {
+            what: script.display().to_string(),
+            source,
+        })?;
     if !status.success() {
-        return Err(QemuError::Build { image: image.to_owned(), status });
+        return Err(QemuError::Build {
+            image: image.to_owned(),
+            status,
+        });
     }
-    Ok(root.join("target/embedded/thumbv7em-none-eabihf/release").join(image))
+    Ok(root
+        .join("target/embedded/thumbv7em-none-eabihf/release")
+        .join(image))
 }
 
-/// Runs an image that ends by itself, such as a check, and returns what it printed over semihosting and how it ended.
+/// Runs an image that ends by itself, such as a check, and returns what it printed over semihosting
+/// and how it ended.
 ///
 /// # Errors
 /// [`QemuError`].
-pub fn run_to_end(image: &Path, flash_file: Option<&Path>) -> Result<std::process::Output, QemuError> {
+pub fn run_to_end(image: &Path, flash_file: Option<&Path>) -> Result<Output, QemuError> {
     require_qemu()?;
-    let output = std::env::temp_dir();
-    let _ = output;
-    todo!()
+    let mut child = qemu_command(image, flash_file)?
+        .args(["-monitor", "none", "-serial", "none"])
+        .args(["-semihosting-config", "enable=on,target=native"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::inherit())
+        .spawn()
+        .map_err(|source| QemuError::Io {
+            what: "starting QEMU through sh".into(),
+            source,
+        })?;
+    // Held open until QEMU has ended: `wait_with_output` would close it at once.
+    let pipe = child.stdin.take();
+    let output = child.wait_with_output();
+    drop(pipe);
+    output.map_err(|source| QemuError::Io {
+        what: "waiting for QEMU".into(),
+        source,
+    })
 }
 
 /// QEMU on this board with this image, set to end with its parent; the caller adds serial line and monitor.
 fn qemu_command(image: &Path, flash_file: Option<&Path>) -> Result<Command, QemuError> {
     let mut command = Command::new("sh");
-    command.args(["-c", ENDS_WITH_PARENT, "sh", "qemu-system-arm", "-machine", "mps2-an386", "-cpu", "cortex-m4"]);
+    command.args([
+        "-c",
+        ENDS_WITH_PARENT,
+        "sh",
+        "qemu-system-arm",
+        "-machine",
+        "mps2-an386",
+        "-cpu",
+        "cortex-m4",
+    ]);
     command.args(["-display", "none"]).arg("-kernel").arg(image);
     if let Some(path) = flash_file {
-        let unreadable = |source| QemuError::Io { what: format!("the flash file {}", path.display()), source };
+        let unreadable = |source| QemuError::Io {
+            what: format!("the flash file {}", path.display()),
+            source,
+        };
         // Opened as well as measured, so that one that cannot be read is found out here and not by QEMU.
-        let length = std::fs::File::open(path).and_then(|file| file.metadata()).map_err(unreadable)?.len();
+        let length = std::fs::File::open(path)
+            .and_then(|file| file.metadata())
+            .map_err(unreadable)?
+            .len();
         if length > FLASH_LENGTH as u64 {
-            return Err(QemuError::FlashTooLong { path: path.to_owned(), length });
+            return Err(QemuError::FlashTooLong {
+                path: path.to_owned(),
+                length,
+            });
         }
         if length > 0 {
             // In QEMU's options a comma ends a value unless it is doubled.
             let file = path.display().to_string().replace(',', ",,");
-            command.args(["-device", &format!("loader,file={file},addr={FLASH_START:#x},force-raw=on")]);
+            command.args([
+                "-device",
+                &format!("loader,file={file},addr={FLASH_START:#x},force-raw=on"),
+            ]);
         }
     }
     Ok(command)
 }
 
 fn require_qemu() -> Result<(), QemuError> {
-    let version = Command::new("qemu-system-arm").arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
+    let version = Command::new("qemu-system-arm")
+        .arg("--version")
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status();
     match version {
         Ok(_) => Ok(()),
         Err(error) if error.kind() == ErrorKind::NotFound => Err(QemuError::NotInstalled),
-        Err(source) => Err(QemuError::Io { what: "qemu-system-arm --version".into(), source }),
+        Err(source) => Err(QemuError::Io {
+            what: "qemu-system-arm --version".into(),
+            source,
+        }),
     }
 }
 
 /// `listen` with a free port in place of 0, after a look whether it can be had at all.
 fn free_address(listen: SocketAddr) -> Result<SocketAddr, QemuError> {
-    let listener = TcpListener::bind(listen).map_err(|source| QemuError::Listen { address: listen, source })?;
-    listener.local_addr().map_err(|source| QemuError::Listen { address: listen, source })
+    let listener = TcpListener::bind(listen).map_err(|source| QemuError::Listen {
+        address: listen,
+        source,
+    })?;
+    listener.local_addr().map_err(|source| QemuError::Listen {
+        address: listen,
+        source,
+    })
 }

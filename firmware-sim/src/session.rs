@@ -30,7 +30,10 @@ pub struct Session {
 impl Session {
     /// A session before its first byte.
     pub const fn new() -> Self {
-        Self { reader: FrameReader::new(), writer: FrameWriter::new() }
+        Self {
+            reader: FrameReader::new(),
+            writer: FrameWriter::new(),
+        }
     }
 
     /// Takes in one byte and returns the frame to send for it, if any.
@@ -49,7 +52,11 @@ impl Session {
     ///
     /// # Errors
     /// If the link broke.
-    pub fn serve<L: Link>(&mut self, link: &mut L, responder: &mut impl Responder) -> Result<(), L::Error> {
+    pub fn serve<L: Link>(
+        &mut self,
+        link: &mut L,
+        responder: &mut impl Responder,
+    ) -> Result<(), L::Error> {
         let mut arrived = [0; 64];
         loop {
             let count = link.read(&mut arrived)?;

@@ -78,7 +78,10 @@ pub fn uart_start() {
     cortex_m::interrupt::disable();
     // The emulated line has no rate; 16 is the least divider that the UART takes.
     write(Register::UartBaudDivider, 16);
-    write(Register::UartControl, CONTROL_TRANSMIT | CONTROL_RECEIVE | CONTROL_RECEIVE_INTERRUPT);
+    write(
+        Register::UartControl,
+        CONTROL_TRANSMIT | CONTROL_RECEIVE | CONTROL_RECEIVE_INTERRUPT,
+    );
     // SAFETY: interrupts are masked, so unmasking this line starts no handler and breaks no critical section.
     unsafe { NVIC::unmask(Uart0Receive) }
 }
@@ -109,7 +112,10 @@ pub fn uart_send(byte: u8) {
 /// Starts the timer, which runs freely at 25 MHz / 256 and wraps after 12.2 hours.
 pub fn timer_start() {
     write(Register::TimerLoad, u32::MAX);
-    write(Register::TimerControl, TIMER_ENABLE | TIMER_PRESCALE_256 | TIMER_32_BIT);
+    write(
+        Register::TimerControl,
+        TIMER_ENABLE | TIMER_PRESCALE_256 | TIMER_32_BIT,
+    );
 }
 
 /// Ticks of the timer, counted upwards.

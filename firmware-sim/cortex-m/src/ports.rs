@@ -25,7 +25,9 @@ impl Link for Uart {
         let mut count = 0;
         while count == 0 {
             for place in buffer.iter_mut() {
-                let Some(byte) = machine::uart_receive() else { break };
+                let Some(byte) = machine::uart_receive() else {
+                    break;
+                };
                 *place = byte;
                 count += 1;
             }
@@ -66,7 +68,10 @@ impl Timer {
     /// Starts it at zero.
     pub fn start() -> Self {
         machine::timer_start();
-        Self { last_ticks: machine::timer_ticks(), total_ticks: 0 }
+        Self {
+            last_ticks: machine::timer_ticks(),
+            total_ticks: 0,
+        }
     }
 }
 

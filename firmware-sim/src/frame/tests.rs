@@ -5,7 +5,10 @@ use crate::cobs;
 use crate::protocol::{PROTOCOL_VERSION, Refusal, Reply, Request};
 
 fn sealed(sequence: u16, request: &Request) -> Vec<u8> {
-    FrameWriter::new().seal(sequence, request).expect("a request fits").to_vec()
+    FrameWriter::new()
+        .seal(sequence, request)
+        .expect("a request fits")
+        .to_vec()
 }
 
 /// What a fresh reader makes of `bytes`, answer by answer.
@@ -40,7 +43,13 @@ const HELLO_CRC: [u8; 4] = [0xfc, 0xae, 0xb7, 0x9c];
 fn a_request_comes_back() {
     for sequence in [1, 255, 256, u16::MAX] {
         let frame = sealed(sequence, &Request::Status);
-        assert_eq!(read(&frame), [Ok(Received { sequence, body: Request::Status })]);
+        assert_eq!(
+            read(&frame),
+            [Ok(Received {
+                sequence,
+                body: Request::Status
+            })]
+        );
     }
 }
 
@@ -59,7 +68,13 @@ fn every_truncation_is_refused_and_the_next_frame_is_read() {
         let answers = read(&bytes);
         assert_eq!(answers.len(), 2, "cut at {length}");
         assert!(answers[0].is_err(), "cut at {length}");
-        assert_eq!(answers[1], Ok(Received { sequence: 3, body: Request::Hello }));
+        assert_eq!(
+            answers[1],
+            Ok(Received {
+                sequence: 3,
+                body: Request::Hello
+            })
+        );
     }
 }
 
@@ -77,17 +92,45 @@ fn every_flipped_bit_is_refused() {
 
 #[test]
 fn another_version_is_refused_under_its_own_number() {
-    let refusal = Refusal::WrongVersion { found: 9, supported: PROTOCOL_VERSION };
-    assert_eq!(read(&framed(&[9, 0x34, 0x12, 0xff, 0xff])), [Err(Rejected { sequence: 0x1234, refusal })]);
+    let refusal = Refusal::WrongVersion {
+        found: 9,
+        supported: PROTOCOL_VERSION,
+    };
+    assert_eq!(
+        read(&framed(&[9, 0x34, 0x12, 0xff, 0xff])),
+        [Err(Rejected {
+            sequence: 0x1234,
+            refusal
+        })]
+    );
 }
 
 #[test]
 fn an_unknown_or_overlong_body_is_refused_under_its_own_number() {
-    let rejected = Err(Rejected { sequence: 5, refusal: Refusal::UnknownMessage });
-    assert_eq!(read(&framed(&[PROTOCOL_VERSION, 5, 0])), [rejected.clone()], "no body");
-    assert_eq!(read(&framed(&[PROTOCOL_VERSION, 5, 0, 99])), [rejected.clone()], "no such request");
-    assert_eq!(read(&framed(&[PROTOCOL_VERSION, 5, 0, 0, 0])), [rejected.clone()], "a byte too many");
-    assert_eq!(read(&framed(&[PROTOCOL_VERSION, 5, 0, 2, 33])), [rejected], "33 matches announced");
+    let rejected = Err(Rejected {
+        sequence: 5,
+        refusal: Refusal::UnknownMessage,
+    });
+    assert_eq!(
+        read(&framed(&[PROTOCOL_VERSION, 5, 0])),
+        [rejected.clone()],
+        "no body"
+    );
+    assert_eq!(
+        read(&framed(&[PROTOCOL_VERSION, 5, 0, 99])),
+        [rejected.clone()],
+        "no such request"
+    );
+    assert_eq!(
+        read(&framed(&[PROTOCOL_VERSION, 5, 0, 0, 0])),
+        [rejected.clone()],
+        "a byte too many"
+    );
+    assert_eq!(
+        read(&framed(&[PROTOCOL_VERSION, 5, 0, 2, 33])),
+        [rejected],
+        "33 matches announced"
+    );
 }
 
 #[test]
@@ -96,12 +139,20 @@ fn an_oversized_frame_is_refused_once_and_the_next_is_read() {
         let mut bytes = vec![0x55; length];
         bytes.push(0);
         bytes.extend_from_slice(&sealed(8, &Request::Hello));
-        let refusal = Refusal::Oversized { limit: MAX_FRAME as u16 };
+        let refusal = Refusal::Oversized {
+            limit: MAX_FRAME as u16,
+        };
         assert_eq!(
             read(&bytes),
             [
-                Err(Rejected { sequence: NO_SEQUENCE, refusal }),
-                Ok(Received { sequence: 8, body: Request::Hello })
+                Err(Rejected {
+                    sequence: NO_SEQUENCE,
+                    refusal
+                }),
+                Ok(Received {
+                    sequence: 8,
+                    body: Request::Hello
+                })
             ]
         );
     }
@@ -112,7 +163,10 @@ fn an_oversized_frame_is_refused_once_and_the_next_is_read() {
 fn a_body_that_does_not_fit_is_not_sealed() {
     let mut writer = FrameWriter::new();
     let fits = vec![1_u8; MAX_MESSAGE - 7 - 2];
-    assert_eq!(writer.seal(1, &&fits[..]).map(<[u8]>::len), Some(cobs::max_encoded_length(MAX_MESSAGE) + 1));
+    assert_eq!(
+        writer.seal(1, &&fits[..]).map(<[u8]>::len),
+        Some(cobs::max_encoded_length(MAX_MESSAGE) + 1)
+    );
     assert!(writer.seal(1, &&[1_u8; MAX_MESSAGE - 7 - 1][..]).is_none());
     assert!(writer.seal(1, &Reply::Refused(Refusal::BadFrame)).is_some());
 }
