@@ -25,7 +25,8 @@ pub struct RayBlob<'a> {
     frame: &'a str,
     written_by: &'a str,
     camera_meta: &'a [u8],
-    self_tests: SelfTests<'a>,
+    self_test_bytes: &'a [u8],
+    self_test_count: u16,
     max_error_px: f32,
     working_distance_mm: f32,
 }
@@ -70,10 +71,8 @@ impl<'a> RayBlob<'a> {
             frame: meta.frame,
             written_by: meta.written_by,
             camera_meta,
-            self_tests: SelfTests {
-                bytes: &[],
-                left: 0,
-            },
+            self_test_bytes: &[],
+            self_test_count: meta.self_test_count,
             max_error_px: meta.max_error_px,
             working_distance_mm: meta.working_distance_mm,
         };
@@ -84,10 +83,7 @@ impl<'a> RayBlob<'a> {
         let self_test_bytes = blob.check_cameras(tables_start)?;
         check_self_tests(self_test_bytes, meta.self_test_count, header.camera_count)?;
         Ok(Self {
-            self_tests: SelfTests {
-                bytes: self_test_bytes,
-                left: meta.self_test_count,
-            },
+            self_test_bytes,
             ..blob
         })
     }
@@ -157,7 +153,10 @@ impl<'a> RayBlob<'a> {
 
     /// Questions whose answers' bits are known.
     pub const fn self_tests(&self) -> SelfTests<'a> {
-        self.self_tests
+        SelfTests {
+            bytes: self.self_test_bytes,
+            left: self.self_test_count,
+        }
     }
 
     /// What the pixel of a camera sees, rig frame.

@@ -207,23 +207,48 @@ mod tests {
         let open = [
             OpenError::Truncated { need: 0, have: 0 },
             OpenError::BadMagic { found: 0 },
-            OpenError::WrongVersion { found: 0, supported: 0 },
+            OpenError::WrongVersion {
+                found: 0,
+                supported: 0,
+            },
             OpenError::TrailingBytes { need: 0, have: 0 },
-            OpenError::BadCrc { stated: 0, computed: 0 },
+            OpenError::BadCrc {
+                stated: 0,
+                computed: 0,
+            },
             OpenError::Misaligned { offset: 1 },
             OpenError::BadHeader,
             OpenError::BadMeta,
             OpenError::BadPadding { at: 0 },
-            OpenError::UnknownEncoding { camera: 0, found: 0 },
-            OpenError::BadLayout { camera: 0, table: Table::Grid },
-            OpenError::BadNumber { camera: 0, table: Table::Mask },
+            OpenError::UnknownEncoding {
+                camera: 0,
+                found: 0,
+            },
+            OpenError::BadLayout {
+                camera: 0,
+                table: Table::Grid,
+            },
+            OpenError::BadNumber {
+                camera: 0,
+                table: Table::Mask,
+            },
         ];
         assert!(open.iter().map(|e| e.code()).eq(1..=12));
         assert_eq!(LookupError::Outside.code(), 64);
-        assert_eq!(LookupError::NoSuchCamera { camera: 2, count: 2 }.code(), 65);
+        assert_eq!(
+            LookupError::NoSuchCamera {
+                camera: 2,
+                count: 2
+            }
+            .code(),
+            65
+        );
         let measure = [
             MeasureError::Outside { camera: 0 },
-            MeasureError::NoSuchCamera { camera: 2, count: 2 },
+            MeasureError::NoSuchCamera {
+                camera: 2,
+                count: 2,
+            },
             MeasureError::TooFewRays { have: 1 },
             MeasureError::Parallel,
             MeasureError::Behind,

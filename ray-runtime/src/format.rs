@@ -427,7 +427,10 @@ mod tests {
     #[test]
     fn checksum_is_the_one_of_zlib() {
         // zlib.crc32(b"123456789123") leaves out nothing; here the four bytes "????" are skipped.
-        assert_eq!(checksum(b"123456789abc????def"), Some(CRC.checksum(b"123456789abcdef")));
+        assert_eq!(
+            checksum(b"123456789abc????def"),
+            Some(CRC.checksum(b"123456789abcdef"))
+        );
         assert_eq!(CRC.checksum(b"123456789"), 0xcbf4_3926);
         assert_eq!(checksum(b"123456789abc???"), None);
     }
@@ -439,20 +442,36 @@ mod tests {
             let size = f64::from(axis.cell_high_px) + f64::from(axis.cell_low_px);
             let exact = f64::from(extent) / f64::from(cells);
             // 12 digits in the high part, 24 more in the low part.
-            assert!((size - exact).abs() <= exact * 2.0f64.powi(-35), "{extent} {cells}");
+            assert!(
+                (size - exact).abs() <= exact * 2.0f64.powi(-35),
+                "{extent} {cells}"
+            );
             let product = axis.cell_high_px * cells as f32;
-            assert_eq!(f64::from(product), f64::from(axis.cell_high_px) * f64::from(cells));
+            assert_eq!(
+                f64::from(product),
+                f64::from(axis.cell_high_px) * f64::from(cells)
+            );
         }
     }
 
     #[test]
     fn a_pixel_on_a_mask_border_is_in_the_cell_after_it() {
-        for (extent, cells) in [(1224u32, 48u32), (1280, 48), (6000, 48), (4500, 36), (6001, 48)] {
+        for (extent, cells) in [
+            (1224u32, 48u32),
+            (1280, 48),
+            (6000, 48),
+            (4500, 36),
+            (6001, 48),
+        ] {
             let axis = Axis::new(0, extent, 4, cells);
             for u in 0..extent {
                 let exact = (2 * u + 1) * cells / (2 * extent);
                 let x = u as f32 + 0.5;
-                assert_eq!((x * axis.mask_cells_per_px) as u32, exact, "{extent} {cells} {u}");
+                assert_eq!(
+                    (x * axis.mask_cells_per_px) as u32,
+                    exact,
+                    "{extent} {cells} {u}"
+                );
             }
         }
     }

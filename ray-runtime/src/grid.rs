@@ -94,7 +94,10 @@ mod tests {
             let value = blend(place.weights, [knot(0), knot(1), knot(2), knot(3)]);
             let exact = (f64::from(u) + 0.5) * 97.0 / 6000.0;
             // 97 cells in f32: one digit is 8e-6 of a cell, and the fraction adds less.
-            assert!((f64::from(value) - exact).abs() < 5e-6, "{u}: {value} {exact}");
+            assert!(
+                (f64::from(value) - exact).abs() < 5e-6,
+                "{u}: {value} {exact}"
+            );
         }
     }
 }

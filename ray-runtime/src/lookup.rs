@@ -45,8 +45,8 @@ pub(crate) fn is_calibrated(bytes: &[u8], record: Record<'_>, pixel: PixelPoint)
         return false;
     }
     let [cells_u, cells_v] = record.mask_cells();
-    let bit = axis_v.mask_cell(pixel.v, cells_v) * cells_u as usize
-        + axis_u.mask_cell(pixel.u, cells_u);
+    let bit =
+        axis_v.mask_cell(pixel.v, cells_v) * cells_u as usize + axis_u.mask_cell(pixel.u, cells_u);
     let byte = bytes.get(record.mask_offset() as usize + (bit >> 3));
     byte.is_some_and(|byte| byte >> (bit & 7) & 1 == 1)
 }

@@ -5,7 +5,7 @@ use crate::format::SelfTest;
 use crate::{PixelPoint, RayBlob};
 
 /// Iterator over a blob's self-tests.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct SelfTests<'a> {
     /// The postcard messages that are left.
     pub(crate) bytes: &'a [u8],

@@ -4,7 +4,7 @@
 //! every target gives the same bits.
 
 use crate::{MeasureError, Ray};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 /// Two rays closer to parallel than this sine have no usable intersection. The host's f64
 /// triangulation uses the same number.
@@ -44,7 +44,7 @@ pub fn triangulate_pair(a: &Ray, b: &Ray) -> Result<Triangulation, MeasureError>
     let inverse = 1.0 / normal_squared;
     let lambda1 = w.cross(&d2).dot(&normal) * inverse;
     let lambda2 = w.cross(&d1).dot(&normal) * inverse;
-    if !(lambda1 > 0.0 && lambda2 > 0.0) {
+    if !(is_positive(lambda1) && is_positive(lambda2)) {
         return Err(MeasureError::Behind);
     }
     let along = w.dot(&normal);
@@ -59,11 +59,16 @@ fn is_wide(normal_squared: f32, d1: &Vector3<f32>, d2: &Vector3<f32>) -> bool {
     normal_squared > MIN_PARALLAX_SIN_SQUARED * (d1.norm_squared() * d2.norm_squared())
 }
 
+/// NaN is not positive.
+fn is_positive(x: f32) -> bool {
+    x > 0.0
+}
+
 /// The point nearest to `count` rays in the least-squares sense; `ray` gives each when asked, any
 /// number of times, so that nothing needs to be stored.
 ///
-/// The normal equations are solved for the step from a point that two of the rays give: in f32
-/// their solution proper would lose the digits that a step keeps.
+/// Solved are the normal equations of the step from a point that two of the rays give: in f32,
+/// solving for the point itself would lose the digits that a step keeps.
 pub(crate) fn triangulate_many(
     count: usize,
     ray: impl Fn(usize) -> Result<Ray, MeasureError>,
@@ -83,8 +88,7 @@ pub(crate) fn triangulate_many(
         let ray = ray(k)?;
         let offset = point - ray.origin_mm;
         let along = offset.dot(&ray.direction);
-        // Written so that NaN counts as behind.
-        if !(along > 0.0) {
+        if !is_positive(along) {
             return Err(MeasureError::Behind);
         }
         let across = offset - ray.direction * (along / ray.direction.norm_squared());
@@ -96,7 +100,7 @@ pub(crate) fn triangulate_many(
     })
 }
 
-/// Gauss-Newton steps on a linear problem: the second removes the round-off of the first.
+/// Steps on a linear problem: the second removes the round-off of the first.
 const STEPS: usize = 2;
 
 /// Where the widest pair of rays that has the first ray in it meets; if all of those are parallel,
@@ -140,25 +144,60 @@ fn nearest_of_pair(a: &Ray, b: &Ray) -> Vector3<f32> {
 }
 
 /// The step from `point` to the least-squares point.
+///
+/// The 3x3 system is set up in axes of which the third lies along the first ray. If all rays are
+/// nearly parallel, the third pivot is of the order of their angles squared: in these axes it is
+/// a sum of small numbers, in the rig's it would be a difference of large ones.
 fn step(
     count: usize,
     ray: &impl Fn(usize) -> Result<Ray, MeasureError>,
     point: &Vector3<f32>,
 ) -> Result<Vector3<f32>, MeasureError> {
-    let mut normal = Matrix3::zeros();
+    let axes = axes_along(&ray(0)?.direction);
+    let in_axes = |a: &Vector3<f32>| Vector3::new(axes[0].dot(a), axes[1].dot(a), axes[2].dot(a));
+    // Upper triangle of the sum of the projections across the rays, and of what they project.
+    let [mut xx, mut xy, mut xz, mut yy, mut yz, mut zz] = [0.0; 6];
     let mut right = Vector3::zeros();
     for k in 0..count {
         let ray = ray(k)?;
-        let d = ray.direction;
+        let d = in_axes(&ray.direction);
+        let offset = in_axes(&(ray.origin_mm - point));
         let inverse = 1.0 / d.norm_squared();
-        let offset = ray.origin_mm - point;
-        normal += Matrix3::identity() - d * (d * inverse).transpose();
-        right += offset - d * (offset.dot(&d) * inverse);
+        xx += (d.y * d.y + d.z * d.z) * inverse;
+        yy += (d.x * d.x + d.z * d.z) * inverse;
+        zz += (d.x * d.x + d.y * d.y) * inverse;
+        xy -= d.x * d.y * inverse;
+        xz -= d.x * d.z * inverse;
+        yz -= d.y * d.z * inverse;
+        right += d.cross(&offset.cross(&d)) * inverse;
     }
-    normal
-        .try_inverse()
-        .map(|inverse| inverse * right)
-        .ok_or(MeasureError::Parallel)
+    // Cholesky without square roots. The first ray alone makes the first two pivots at least 1.
+    let (l_yx, l_zx) = (xy / xx, xz / xx);
+    let pivot_y = yy - l_yx * xy;
+    let rest_yz = yz - l_zx * xy;
+    let l_zy = rest_yz / pivot_y;
+    let pivot_z = zz - l_zx * xz - l_zy * rest_yz;
+    if !is_positive(pivot_z) {
+        return Err(MeasureError::Parallel);
+    }
+    let y = right.y - l_yx * right.x;
+    let z = (right.z - l_zx * right.x - l_zy * y) / pivot_z;
+    let y = y / pivot_y - l_zy * z;
+    let x = right.x / xx - l_yx * y - l_zx * z;
+    Ok(axes[0] * x + axes[1] * y + axes[2] * z)
+}
+
+/// Three unit vectors at right angles, the third along `direction`.
+fn axes_along(direction: &Vector3<f32>) -> [Vector3<f32>; 3] {
+    let unit = |a: Vector3<f32>| a * (1.0 / libm::sqrtf(a.norm_squared()));
+    let along = unit(*direction);
+    let least_parallel = if along.x * along.x < 0.5 {
+        Vector3::new(1.0, 0.0, 0.0)
+    } else {
+        Vector3::new(0.0, 1.0, 0.0)
+    };
+    let first = unit(along.cross(&least_parallel));
+    [first, along.cross(&first), along]
 }
 
 #[cfg(test)]
