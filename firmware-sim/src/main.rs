@@ -86,6 +86,8 @@ fn run_on_host(arguments: &DeviceArguments) -> anyhow::Result<()> {
 }
 
 fn run_in_qemu(arguments: &DeviceArguments, image: Option<&Path>) -> anyhow::Result<()> {
+    // Before the image, whose first build takes a minute.
+    qemu::require_qemu()?;
     let image = match image {
         Some(path) => path.to_owned(),
         None => qemu::build_image("device")?,

@@ -30,7 +30,7 @@ exec 3<&0
 child=$!
 { read -r _ <&3; kill -KILL $child; } 2>/dev/null &
 watchdog=$!
-wait $child
+{ wait $child; } 2>/dev/null
 status=$?
 kill -KILL $watchdog 2>/dev/null
 exit $status
@@ -298,7 +298,11 @@ fn qemu_command(image: &Path, flash_file: Option<&Path>) -> Result<Command, Qemu
     Ok(command)
 }
 
-fn require_qemu() -> Result<(), QemuError> {
+/// Makes sure that QEMU is installed.
+///
+/// # Errors
+/// [`QemuError::NotInstalled`], with the remedy in its text.
+pub fn require_qemu() -> Result<(), QemuError> {
     let version = Command::new("qemu-system-arm")
         .arg("--version")
         .stdout(Stdio::null())

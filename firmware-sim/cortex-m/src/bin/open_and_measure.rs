@@ -1,0 +1,79 @@
+//! Opens the blob at the start of the flash and triangulates a few matches of cameras 0 and 1. The
+//! numbers are printed with all the digits that tell their bits apart.
+
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use cortex_m_semihosting::{debug, hprintln};
+use firmware_cortex_m::machine;
+use ray_runtime::{PixelPoint, RayBlob};
+
+/// (u, v) in camera 0 and in camera 1, px.
+const MATCHES: [[f32; 4]; 6] = [
+    [320.0, 240.0, 250.0, 240.5],
+    [100.25, 400.75, 60.5, 401.0],
+    [600.0, 20.0, 480.0, 19.0],
+    // Seen further right by the right camera than by the left one: the rays meet behind them.
+    [300.0, 250.0, 500.0, 250.0],
+    // Outside the sensor, and no number.
+    [-1.0, 100.0, 50.0, 100.0],
+    [f32::NAN, 100.0, 50.0, 100.0],
+];
+
+#[entry]
+fn main() -> ! {
+    let flash = machine::flash();
+    let opened = RayBlob::stated_len(flash)
+        .and_then(|length| RayBlob::open(flash.get(..length as usize).unwrap_or(flash)));
+    let blob = match opened {
+        Ok(blob) => blob,
+        Err(error) => {
+            hprintln!("no blob: {}", error);
+            exit(debug::EXIT_FAILURE)
+        }
+    };
+    hprintln!(
+        "{} bytes, frame {}, {} cameras",
+        blob.len(),
+        blob.frame(),
+        blob.camera_count()
+    );
+    for camera in (0..blob.camera_count()).filter_map(|index| blob.camera(index)) {
+        hprintln!(
+            "{}: {} x {} px",
+            camera.name,
+            camera.sensor_width,
+            camera.sensor_height
+        );
+    }
+    for [u0, v0, u1, v1] in MATCHES {
+        match blob.triangulate((0, PixelPoint::new(u0, v0)), (1, PixelPoint::new(u1, v1))) {
+            Ok(found) => {
+                let [x, y, z]: [f32; 3] = found.point_mm.into();
+                hprintln!(
+                    "point {} {} {} mm, gap squared {} mm2",
+                    x,
+                    y,
+                    z,
+                    found.gap_squared_mm2
+                );
+            }
+            Err(error) => hprintln!("{}", error),
+        }
+    }
+    exit(debug::EXIT_SUCCESS)
+}
+
+/// Ends QEMU with this status.
+fn exit(status: debug::ExitStatus) -> ! {
+    loop {
+        debug::exit(status);
+    }
+}
+
+#[panic_handler]
+fn panic(info: &core::panic::PanicInfo) -> ! {
+    hprintln!("{}", info);
+    exit(debug::EXIT_FAILURE)
+}
