@@ -4,4 +4,5 @@ pub mod board;
 pub mod dataset;
 pub mod field;
 pub mod geometry;
+pub mod pack;
 pub mod report;

@@ -275,7 +275,7 @@ impl<'a> RayBlob<'a> {
         if !(same_bits(axis_u, record.axis_u())
             && same_bits(axis_v, record.axis_v())
             && is_rotation(record.rotation())
-            && record.translation_mm().iter().all(is_moderate))
+            && record.translation_mm().into_iter().all(is_moderate))
         {
             return Err(number(Table::Record));
         }
@@ -286,7 +286,7 @@ impl<'a> RayBlob<'a> {
             .get(start / 4..grid_end / 4)
             .filter(|_| record.grid_offset() as usize == start)
             .ok_or(layout(Table::Grid))?;
-        if !grid.iter().all(is_moderate) {
+        if !grid.iter().copied().all(is_moderate) {
             return Err(number(Table::Grid));
         }
 
@@ -402,9 +402,9 @@ fn is_region_on_sensor(meta: &CameraMeta<'_>) -> bool {
         && fits(meta.region_v, meta.region_height, meta.sensor_height)
 }
 
-fn is_moderate(x: &f32) -> bool {
+fn is_moderate(x: f32) -> bool {
     // NaN is in no range.
-    (-MAX_MAGNITUDE..=MAX_MAGNITUDE).contains(x)
+    (-MAX_MAGNITUDE..=MAX_MAGNITUDE).contains(&x)
 }
 
 fn same_bits(a: Axis, b: Axis) -> bool {

@@ -1,0 +1,348 @@
+//! One control grid per camera: the field resampled by least squares.
+
+use super::PackError;
+use super::field_rows::FieldRows;
+use crate::field::CalibratedCamera;
+use crate::field::spline::{AxisWeights, SplineGrid};
+use crate::field::transport::MAX_HALF_ANGLE_LENGTH;
+use crate::geometry::PixelPoint;
+use ray_runtime::format::{self, Encoding};
+
+/// A camera's field as the runtime evaluates it: knots of a uniform bicubic B-spline whose cells
+/// cover the sensor from outer edge to outer edge.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ControlGrid {
+    /// Cells along u and v.
+    pub cells: [u32; 2],
+    /// How the knots are stored.
+    pub encoding: Encoding,
+    /// Row-major: the half-angle vector and, if not central, `m / (4 + s.s)` in mm.
+    pub knots: Vec<[f64; 4]>,
+}
+
+impl ControlGrid {
+    /// Size of the table, bytes.
+    pub fn byte_count(&self) -> usize {
+        format::grid_len(self.encoding, self.cells)
+    }
+}
+
+/// Lattice points per cell along each axis.
+const POINTS_PER_CELL: usize = 4;
+
+/// Weight of lattice points up to one cell outside the calibrated area, relative to those inside.
+/// They hold the knots that the area itself barely touches; their misfit is of the order of the
+/// misfit inside, so a thousandth of it does not show.
+const OUTSIDE_WEIGHT: f64 = 1e-3;
+
+/// Weight of the thin-plate energy of the knots. It decides what nothing else decides: far from
+/// the calibrated area the grid goes on as it was bent last, where a plain ridge would let the
+/// outer knots run to large values.
+const THIN_PLATE_WEIGHT: f64 = 1e-9;
+
+/// Fits a grid with `cells` to a camera's field.
+///
+/// # Errors
+/// [`PackError::Field`] where the field has no direction that can be packed, [`PackError::Fit`].
+pub fn fit(camera: &CalibratedCamera, cells: [u32; 2]) -> Result<ControlGrid, PackError> {
+    let field = &camera.field;
+    let grid = SplineGrid {
+        sensor: field.sensor,
+        cells_u: cells[0] as usize,
+        cells_v: cells[1] as usize,
+    };
+    let lattice = Lattice::new(camera, &grid);
+    let order = KnotOrder::new(&grid);
+    let mut system = BandedSystem::new(grid.knot_count(), order.half_bandwidth());
+    add_thin_plate(&mut system, &grid, &order);
+
+    let rows = FieldRows::new(field, lattice.u_px.clone());
+    let weights_u: Vec<_> = lattice.u_px.iter().map(|u| grid.weights_u(*u)).collect();
+    for (row_idx, &v) in lattice.v_px.iter().enumerate() {
+        let row = rows.row(v);
+        let weights_v = grid.weights_v(v);
+        for (column, weights_u) in weights_u.iter().enumerate() {
+            let weight = lattice.weights[row_idx * lattice.u_px.len() + column];
+            if weight == 0.0 {
+                continue;
+            }
+            let sample = row.sample(column);
+            let length_squared = sample.s.norm_squared();
+            let is_usable = length_squared <= MAX_HALF_ANGLE_LENGTH * MAX_HALF_ANGLE_LENGTH
+                && sample.m_mm.iter().all(|m| m.is_finite());
+            if !is_usable && weight == 1.0 {
+                return Err(PackError::Field {
+                    camera: camera.name.clone(),
+                    pixel: PixelPoint::new(lattice.u_px[column], v),
+                    s: sample.s.into(),
+                });
+            }
+            if is_usable {
+                let m = sample.m_mm / (4.0 + length_squared);
+                let value = [sample.s.x, sample.s.y, m.x, m.y];
+                system.add_point(&order, weights_u, &weights_v, weight, value);
+            }
+        }
+    }
+    let solution = system.solve().ok_or_else(|| PackError::Fit {
+        camera: camera.name.clone(),
+        cells,
+    })?;
+    let knots = (0..grid.knots_v())
+        .flat_map(|j| (0..grid.knots_u()).map(move |i| (i, j)))
+        .map(|(i, j)| solution[order.index(i, j)])
+        .collect();
+    Ok(ControlGrid {
+        cells,
+        encoding: if field.is_central() {
+            Encoding::CentralF32
+        } else {
+            Encoding::NonCentralF32
+        },
+        knots,
+    })
+}
+
+/// Where the field is sampled, and what each sample counts.
+struct Lattice {
+    u_px: Vec<f64>,
+    v_px: Vec<f64>,
+    /// Row-major: 1 in the calibrated area, [`OUTSIDE_WEIGHT`] around it, 0 beyond.
+    weights: Vec<f64>,
+}
+
+impl Lattice {
+    fn new(camera: &CalibratedCamera, grid: &SplineGrid) -> Self {
+        let axis = |extent: u32, cells: usize| -> Vec<f64> {
+            let steps = cells * POINTS_PER_CELL;
+            (0..=steps)
+                .map(|k| k as f64 * f64::from(extent) / steps as f64 - 0.5)
+                .collect()
+        };
+        let u_px = axis(grid.sensor.width, grid.cells_u);
+        let v_px = axis(grid.sensor.height, grid.cells_v);
+        let is_inside = |u: f64, v: f64| camera.coverage.contains(PixelPoint::new(u, v));
+        let inside: Vec<bool> = v_px
+            .iter()
+            .flat_map(|v| u_px.iter().map(|u| is_inside(*u, *v)))
+            .collect();
+        let (width, height) = (u_px.len(), v_px.len());
+        let wide = dilated(&inside, width, height, 1, POINTS_PER_CELL);
+        let around = dilated(&wide, height, width, width, POINTS_PER_CELL);
+        let weights = inside
+            .iter()
+            .zip(&around)
+            .map(|(inside, around)| match (inside, around) {
+                (true, _) => 1.0,
+                (false, true) => OUTSIDE_WEIGHT,
+                (false, false) => 0.0,
+            })
+            .collect();
+        Self {
+            u_px,
+            v_px,
+            weights,
+        }
+    }
+}
+
+/// Flags set within `reach` steps of a set one, along lines of `length` flags `stride` apart.
+fn dilated(flags: &[bool], length: usize, lines: usize, stride: usize, reach: usize) -> Vec<bool> {
+    // Lines along u start at multiples of their length; lines along v at consecutive places.
+    let line_stride = if stride == 1 { length } else { 1 };
+    let mut result = flags.to_vec();
+    for line in 0..lines {
+        let at = |k: usize| line * line_stride + k * stride;
+        for k in (0..length).filter(|k| flags[at(*k)]) {
+            for near in k.saturating_sub(reach)..=(k + reach).min(length - 1) {
+                result[at(near)] = true;
+            }
+        }
+    }
+    result
+}
+
+/// Numbers the knots along the shorter axis first, which keeps the band narrow.
+struct KnotOrder {
+    step_u: usize,
+    step_v: usize,
+}
+
+impl KnotOrder {
+    fn new(grid: &SplineGrid) -> Self {
+        if grid.knots_u() <= grid.knots_v() {
+            Self {
+                step_u: 1,
+                step_v: grid.knots_u(),
+            }
+        } else {
+            Self {
+                step_u: grid.knots_v(),
+                step_v: 1,
+            }
+        }
+    }
+
+    fn index(&self, i: usize, j: usize) -> usize {
+        i * self.step_u + j * self.step_v
+    }
+
+    fn half_bandwidth(&self) -> usize {
+        3 * (self.step_u + self.step_v)
+    }
+}
+
+/// Symmetric banded normal equations with four right-hand sides.
+struct BandedSystem {
+    half_bandwidth: usize,
+    /// Row k holds the entries of columns `k - half_bandwidth ..= k`.
+    lower: Vec<f64>,
+    right: Vec<[f64; 4]>,
+}
+
+impl BandedSystem {
+    fn new(size: usize, half_bandwidth: usize) -> Self {
+        Self {
+            half_bandwidth,
+            lower: vec![0.0; size * (half_bandwidth + 1)],
+            right: vec![[0.0; 4]; size],
+        }
+    }
+
+    /// Adds to the entry (row, column), or to its mirror image.
+    fn add(&mut self, a: usize, b: usize, value: f64) {
+        let (row, column) = (a.max(b), a.min(b));
+        let width = self.half_bandwidth + 1;
+        self.lower[row * width + self.half_bandwidth - (row - column)] += value;
+    }
+
+    /// Adds the square of a weighted sum of knots.
+    fn add_square(&mut self, terms: &[(usize, f64)], weight: f64) {
+        for (k, &(a, wa)) in terms.iter().enumerate() {
+            for &(b, wb) in &terms[..=k] {
+                self.add(a, b, weight * wa * wb);
+            }
+        }
+    }
+
+    fn add_point(
+        &mut self,
+        order: &KnotOrder,
+        weights_u: &AxisWeights,
+        weights_v: &AxisWeights,
+        weight: f64,
+        value: [f64; 4],
+    ) {
+        let mut terms = [(0, 0.0); 16];
+        for j in 0..4 {
+            for i in 0..4 {
+                terms[4 * j + i] = (
+                    order.index(weights_u.first + i, weights_v.first + j),
+                    weights_u.value[i] * weights_v.value[j],
+                );
+            }
+        }
+        self.add_square(&terms, weight);
+        for (knot, knot_weight) in terms {
+            for (sum, channel) in self.right[knot].iter_mut().zip(value) {
+                *sum += weight * knot_weight * channel;
+            }
+        }
+    }
+
+    /// Cholesky factorization and both substitutions; `None` if the matrix is not positive
+    /// definite.
+    fn solve(mut self) -> Option<Vec<[f64; 4]>> {
+        let (p, width) = (self.half_bandwidth, self.half_bandwidth + 1);
+        for row in 0..self.right.len() {
+            let first = row.saturating_sub(p);
+            let (above, this) = self.lower.split_at_mut(row * width);
+            for column in first..row {
+                let other = &above[column * width..(column + 1) * width];
+                // Entries of both rows in the columns first .. column.
+                let count = column - first;
+                let start_this = p - (row - first);
+                let start_other = p - count;
+                let sum: f64 = dot(
+                    &this[start_this..start_this + count],
+                    &other[start_other..start_other + count],
+                );
+                let place = p - (row - column);
+                this[place] = (this[place] - sum) / other[p];
+            }
+            let start = p - (row - first);
+            let pivot = this[p] - dot(&this[start..p], &this[start..p]);
+            if !(pivot > 0.0 && pivot.is_finite()) {
+                return None;
+            }
+            this[p] = pivot.sqrt();
+        }
+        for row in 0..self.right.len() {
+            let entries = &self.lower[row * width..(row + 1) * width];
+            for column in row.saturating_sub(p)..row {
+                let factor = entries[p - (row - column)];
+                for channel in 0..4 {
+                    self.right[row][channel] -= factor * self.right[column][channel];
+                }
+            }
+            self.right[row].iter_mut().for_each(|x| *x /= entries[p]);
+        }
+        for row in (0..self.right.len()).rev() {
+            let entries = &self.lower[row * width..(row + 1) * width];
+            self.right[row].iter_mut().for_each(|x| *x /= entries[p]);
+            for column in row.saturating_sub(p)..row {
+                let factor = entries[p - (row - column)];
+                for channel in 0..4 {
+                    self.right[column][channel] -= factor * self.right[row][channel];
+                }
+            }
+        }
+        Some(self.right)
+    }
+}
+
+/// Dot product in eight running sums, which the compiler keeps in vector registers.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (a_chunks, b_chunks) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = a_chunks
+        .remainder()
+        .iter()
+        .zip(b_chunks.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
+    for (x, y) in a_chunks.zip(b_chunks) {
+        for k in 0..8 {
+            sums[k] += x[k] * y[k];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
+
+/// The discrete thin-plate energy of the knots: squared second differences along u and v, twice
+/// the squared mixed ones.
+fn add_thin_plate(system: &mut BandedSystem, grid: &SplineGrid, order: &KnotOrder) {
+    let (knots_u, knots_v) = (grid.knots_u(), grid.knots_v());
+    for j in 0..knots_v {
+        for i in 0..knots_u {
+            let at = |di: usize, dj: usize| order.index(i + di, j + dj);
+            if i + 2 < knots_u {
+                let terms = [(at(0, 0), 1.0), (at(1, 0), -2.0), (at(2, 0), 1.0)];
+                system.add_square(&terms, THIN_PLATE_WEIGHT);
+            }
+            if j + 2 < knots_v {
+                let terms = [(at(0, 0), 1.0), (at(0, 1), -2.0), (at(0, 2), 1.0)];
+                system.add_square(&terms, THIN_PLATE_WEIGHT);
+            }
+            if i + 1 < knots_u && j + 1 < knots_v {
+                let terms = [
+                    (at(0, 0), 1.0),
+                    (at(1, 0), -1.0),
+                    (at(0, 1), -1.0),
+                    (at(1, 1), 1.0),
+                ];
+                system.add_square(&terms, 2.0 * THIN_PLATE_WEIGHT);
+            }
+        }
+    }
+}
