@@ -19,7 +19,7 @@ pub const FLASH_LENGTH: usize = 16 << 20;
 const MAX_PEERS: usize = 16;
 
 /// A peer that says nothing for so long is taken for dead.
-const SILENCE_LIMIT: Duration = Duration::from_secs(600);
+const SILENCE_LIMIT: Duration = Duration::from_mins(10);
 
 /// A simulated device that serves in the background until the process ends.
 #[derive(Debug)]

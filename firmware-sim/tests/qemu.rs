@@ -98,7 +98,10 @@ fn it_answers_the_bits_of_the_host_for_500_matches() {
     std::thread::sleep(Duration::from_millis(300));
     let passed_ms = client.status().unwrap().uptime_ms - status.uptime_ms;
     let most_ms = start.elapsed().as_millis() as u64 + 2;
-    assert!((100..=most_ms).contains(&passed_ms), "{passed_ms} ms of at most {most_ms}");
+    assert!(
+        (100..=most_ms).contains(&passed_ms),
+        "{passed_ms} ms of at most {most_ms}"
+    );
 }
 
 #[test]

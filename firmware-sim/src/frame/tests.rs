@@ -107,30 +107,24 @@ fn another_version_is_refused_under_its_own_number() {
 
 #[test]
 fn an_unknown_or_overlong_body_is_refused_under_its_own_number() {
-    let rejected = Err(Rejected {
-        sequence: 5,
-        refusal: Refusal::UnknownMessage,
-    });
-    assert_eq!(
-        read(&framed(&[PROTOCOL_VERSION, 5, 0])),
-        [rejected.clone()],
-        "no body"
-    );
-    assert_eq!(
-        read(&framed(&[PROTOCOL_VERSION, 5, 0, 99])),
-        [rejected.clone()],
-        "no such request"
-    );
-    assert_eq!(
-        read(&framed(&[PROTOCOL_VERSION, 5, 0, 0, 0])),
-        [rejected.clone()],
-        "a byte too many"
-    );
-    assert_eq!(
-        read(&framed(&[PROTOCOL_VERSION, 5, 0, 2, 33])),
-        [rejected],
-        "33 matches announced"
-    );
+    let refusal = Refusal::UnknownMessage;
+    for (body, why) in [
+        (&[][..], "no body"),
+        (&[99], "no such request"),
+        (&[0, 0], "a byte too many"),
+        (&[2, 33], "33 matches announced"),
+    ] {
+        let checked = [&[PROTOCOL_VERSION, 5, 0], body].concat();
+        let answers = read(&framed(&checked));
+        assert_eq!(
+            answers,
+            [Err(Rejected {
+                sequence: 5,
+                refusal
+            })],
+            "{why}"
+        );
+    }
 }
 
 #[test]
