@@ -31,16 +31,24 @@ embedded_find_linker() {
   return 1
 }
 
-# The release of Debian's compiler, if the sources of exactly that release are installed beside it.
+# The release of Debian's compiler, if it is new enough and the sources of exactly that release are installed beside it.
 embedded_debian_release() {
-  local release sources
+  local release oldest sources
   [ -x /usr/bin/rustc ] && [ -x /usr/bin/cargo ] || return 1
   release=$(/usr/bin/rustc -vV | sed -n 's/^release: //p')
+  oldest=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' "$repository/Cargo.toml")
+  if [ "$(printf '%s\n' "$oldest" "$release" | sort -V | head -1)" != "$oldest" ]; then
+    echo "embedded: Debian's rustc $release is older than $oldest" >&2
+    return 1
+  fi
   sources=$(readlink -f /usr/lib/rustlib/src/rust) || return 1
   [ -f "$sources/library/core/Cargo.toml" ] || return 1
   case "$sources" in
     *rustc-"$release") echo "$release" ;;
-    *) echo "embedded: $sources are not the sources of Debian's rustc $release" >&2; return 1 ;;
+    *)
+      echo "embedded: $sources does not hold the sources of Debian's rustc $release" >&2
+      return 1
+      ;;
   esac
 }
 

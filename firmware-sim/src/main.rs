@@ -90,7 +90,10 @@ fn run_in_qemu(arguments: &DeviceArguments, image: Option<&Path>) -> anyhow::Res
     qemu::require_qemu()?;
     let image = match image {
         Some(path) => path.to_owned(),
-        None => qemu::build_image("device")?,
+        None => {
+            eprintln!("firmware-sim: building the image, unless it is up to date");
+            qemu::build_image("device")?
+        }
     };
     let device = QemuDevice::start(arguments.listen, &image, arguments.flash_file.as_deref())?;
     announce(device.address())?;
