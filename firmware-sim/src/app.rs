@@ -24,7 +24,7 @@ pub struct Device<'f, C> {
 }
 
 impl<'f, C: Clock> Device<'f, C> {
-    /// Starts a device of the given kind: checks the blob in `store`, all of it, and opens it in place.
+    /// Starts a device of the given kind: checks the whole blob in `store` and opens it in place.
     ///
     /// A blob that cannot be opened does not stop it: it answers, and says what is wrong.
     pub fn boot(kind: &'static str, store: &'f impl BlobStore, clock: C) -> Self {
@@ -96,7 +96,7 @@ fn open(flash: &[u8]) -> Result<RayBlob<'_>, OpenError> {
     RayBlob::open(flash.get(..length).unwrap_or(flash))
 }
 
-/// As many of the items as fit. (`collect` would panic at one more, which the device image rules out.)
+/// As many of the items as fit. (`collect` would panic at one more, and the image may not.)
 fn bounded<T, const N: usize>(items: impl Iterator<Item = T>) -> Vec<T, N> {
     let mut vec = Vec::new();
     for item in items {

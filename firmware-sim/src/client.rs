@@ -13,8 +13,8 @@ use crate::protocol::{Hello, MAX_MATCHES, Match, Measured, Refusal, Reply, Reque
 /// How long an answer may take, unless said otherwise.
 pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Batches under way at once: enough to hide the link's delay, few enough that neither side's socket buffer fills up
-/// while the other is still sending.
+/// Batches under way at once: enough to hide the link's delay, few enough that neither side's
+/// socket buffer fills up while the other is still sending.
 const WINDOW: usize = 8;
 
 /// Why a device gave no answer, or not the one asked for.
@@ -109,7 +109,8 @@ pub struct DeviceClient {
 }
 
 impl DeviceClient {
-    /// Connects to `address`, `tcp:HOST:PORT`, and makes sure that a device of this protocol version answers.
+    /// Connects to `address`, `tcp:HOST:PORT`, and makes sure that a device of this protocol
+    /// version answers.
     ///
     /// # Errors
     /// [`ClientError`], after [`DEFAULT_TIMEOUT`] at the latest.
@@ -147,7 +148,8 @@ impl DeviceClient {
             last_sequence: NO_SEQUENCE,
             batch_length: MAX_MATCHES,
         };
-        // Ends what an earlier peer may have left unfinished; the device refuses it, and `greet` skips that refusal.
+        // Ends what an earlier peer may have left unfinished; the device refuses it, and `greet`
+        // skips that refusal.
         client.send_bytes(&[DELIMITER])?;
         let hello = client.greet()?;
         client.batch_length = usize::from(hello.max_matches).clamp(1, MAX_MATCHES);
@@ -181,8 +183,8 @@ impl DeviceClient {
     /// They travel in batches, several of which are under way at once.
     ///
     /// # Errors
-    /// [`ClientError`]; [`Refusal::NoBlob`] inside it if the device has nothing to measure with. A match that the
-    /// device cannot triangulate is no error here but an outcome of its own.
+    /// [`ClientError`]; [`Refusal::NoBlob`] inside it if the device has nothing to measure with. A
+    /// match that the device cannot triangulate is no error here but an outcome of its own.
     pub fn measure(&mut self, matches: &[Match]) -> Result<Vec<Measured>, ClientError> {
         let mut measured = Vec::with_capacity(matches.len());
         let mut under_way = VecDeque::with_capacity(WINDOW);
@@ -361,7 +363,8 @@ fn connect_tcp(host_and_port: &str, timeout: Duration) -> std::io::Result<TcpStr
     for address in host_and_port.to_socket_addrs()? {
         match TcpStream::connect_timeout(&address, timeout) {
             Ok(stream) => {
-                // Without this, each question waits for the acknowledgement of the one before: 47 ms instead of 2.
+                // Without this, each question waits for the acknowledgement of the one before: 47
+                // ms instead of 2.
                 stream.set_nodelay(true)?;
                 stream.set_write_timeout(Some(timeout))?;
                 return Ok(stream);

@@ -1,11 +1,12 @@
-//! Consistent Overhead Byte Stuffing: any bytes become bytes without a zero, so that a zero can end a frame.
+//! Consistent Overhead Byte Stuffing: any bytes become bytes without a zero, so that a zero can end
+//! a frame.
 //!
-//! Each block starts with a code byte `c`: `c - 1` bytes follow as they are, and unless `c` is 255 or the
-//! frame ends there, a zero stands behind them (Cheshire and Baker, 1997). The cost is one byte, plus one for
-//! every 254 bytes without a zero.
+//! Each block starts with a code byte `c`: `c - 1` bytes follow as they are, and unless `c` is 255
+//! or the frame ends there, a zero stands behind them (Cheshire and Baker, 1997). The cost is one
+//! byte, plus one for every 254 bytes without a zero.
 //!
-//! Written here because the crate that `postcard` brings for it links a panic into the device image; all
-//! access below goes through `get`, so that none is reachable.
+//! Written here because the crate that `postcard` brings for it links a panic into the device
+//! image; all access below goes through `get`, so that none is reachable.
 
 /// The code byte of a block of 254 bytes with no zero behind it.
 const FULL_BLOCK: u8 = 0xff;
@@ -15,8 +16,9 @@ pub const fn max_encoded_length(length: usize) -> usize {
     length + length / 254 + 1
 }
 
-/// Encodes `message` into `out` and returns how many bytes were written: never a zero among them, and no
-/// delimiter at the end. `None` if `out` is too short; [`max_encoded_length`] always suffices.
+/// Encodes `message` into `out` and returns how many bytes were written: never a zero among them,
+/// and no delimiter at the end. `None` if `out` is too short; [`max_encoded_length`] always
+/// suffices.
 ///
 /// # Example
 /// ```
@@ -47,8 +49,9 @@ pub fn encode(message: &[u8], out: &mut [u8]) -> Option<usize> {
     Some(write_at)
 }
 
-/// Decodes `frame` (without its delimiter) in place and returns the length of the message, which then stands
-/// at its start. `None` if the bytes are no encoding: a zero inside, or a block longer than the frame.
+/// Decodes `frame` (without its delimiter) in place and returns the length of the message, which
+/// then stands at its start. `None` if the bytes are no encoding: a zero inside, or a block longer
+/// than the frame.
 pub fn decode_in_place(frame: &mut [u8]) -> Option<usize> {
     let mut read_at = 0;
     let mut write_at = 0;

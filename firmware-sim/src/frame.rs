@@ -3,12 +3,13 @@
 //! ```text
 //! COBS( version u8 | sequence u16 LE | body (postcard) | CRC-32 LE of all before ) 0x00
 //! ```
-//! The head and the checksum stay as they are in every protocol version, so that a device can refuse a version
-//! that it does not speak in words that the other side understands. The checksum is CRC-32/ISO-HDLC (zlib's).
+//! The head and the checksum stay as they are in every protocol version, so that a device can
+//! refuse a version that it does not speak in words that the other side understands. The checksum
+//! is CRC-32/ISO-HDLC (zlib's).
 //!
-//! Sequence 0 belongs to refusals of frames whose own number could not be read; requests start at 1. Delimiters
-//! with nothing between them are skipped in silence, so a sender may begin with one to cut off what an earlier
-//! peer left unfinished.
+//! Sequence 0 belongs to refusals of frames whose own number could not be read; requests have any
+//! other. Delimiters with nothing between them are skipped in silence, so a sender may begin with
+//! one to cut off what an earlier peer left unfinished.
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 use serde::{Serialize, de::DeserializeOwned};
@@ -72,8 +73,8 @@ impl FrameWriter {
         }
     }
 
-    /// The frame of `body` with its delimiter, or `None` if the message is longer than [`MAX_MESSAGE`]: no
-    /// message of [`crate::protocol`] is, which a test there shows.
+    /// The frame of `body` with its delimiter, or `None` if the message is longer than
+    /// [`MAX_MESSAGE`]: no message of [`crate::protocol`] is, which a test there shows.
     pub fn seal<Body: Serialize>(&mut self, sequence: u16, body: &Body) -> Option<&[u8]> {
         let [low, high] = sequence.to_le_bytes();
         let (head, rest) = self.message.split_first_chunk_mut::<HEAD_LENGTH>()?;
@@ -118,9 +119,11 @@ impl FrameReader {
         }
     }
 
-    /// Takes in one byte. `None` while a frame is under way; at its delimiter the message, or why it is refused.
+    /// Takes in one byte. `None` while a frame is under way; at its delimiter the message, or why
+    /// it is refused.
     ///
-    /// A frame that does not fit is dropped up to its delimiter and then refused as oversized, once.
+    /// A frame that does not fit is dropped up to its delimiter and then refused as oversized,
+    /// once.
     pub fn push<Body: DeserializeOwned>(
         &mut self,
         byte: u8,

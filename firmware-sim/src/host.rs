@@ -29,8 +29,8 @@ pub struct SimulatedDevice {
 }
 
 impl SimulatedDevice {
-    /// Starts one that listens on `listen` (port 0 takes a free one), with `flash` at the start of its flash; the
-    /// rest of the flash is zero, as in QEMU.
+    /// Starts one that listens on `listen` (port 0 takes a free one), with `flash` at the start of
+    /// its flash; the rest of the flash is zero, as in QEMU.
     ///
     /// # Errors
     /// If the address cannot be listened on, or `flash` is longer than [`FLASH_LENGTH`].

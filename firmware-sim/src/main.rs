@@ -24,7 +24,8 @@ struct Arguments {
 enum Command {
     /// The device on this computer.
     Host(DeviceArguments),
-    /// The same application as a Cortex-M4F image in QEMU; the image is built first when it is missing or stale.
+    /// The same application as a Cortex-M4F image in QEMU; the image is built first when it is
+    /// missing or stale.
     Qemu {
         #[command(flatten)]
         device: DeviceArguments,
@@ -36,12 +37,12 @@ enum Command {
 
 #[derive(clap::Args)]
 struct DeviceArguments {
-    /// Where to listen: ADDRESS:PORT, or PORT on the loopback interface. Port 0 picks a free one. The first line on
-    /// standard output says which.
+    /// Where to listen: ADDRESS:PORT, or PORT on the loopback interface. Port 0 picks a free one.
+    /// The first line on standard output says which.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:0", value_parser = listen_address)]
     listen: SocketAddr,
-    /// What the device's flash holds from its start, such as a blob that `calib-offline calibrate` wrote. Without it
-    /// the flash is empty.
+    /// What the device's flash holds from its start, such as a blob that `calib-offline calibrate`
+    /// wrote. Without it the flash is empty.
     #[arg(long, value_name = "FILE")]
     flash_file: Option<PathBuf>,
 }
@@ -101,7 +102,8 @@ fn run_in_qemu(arguments: &DeviceArguments, image: Option<&Path>) -> anyhow::Res
     anyhow::bail!("QEMU stopped ({status})")
 }
 
-/// Says where the device can be reached. Whoever started this program may wait for the line, so it must get out.
+/// Says where the device can be reached. Whoever started this program may wait for the line, so it
+/// must get out.
 fn announce(address: SocketAddr) -> anyhow::Result<()> {
     let mut output = std::io::stdout();
     writeln!(output, "listening on {address}")

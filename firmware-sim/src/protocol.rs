@@ -1,10 +1,10 @@
 //! The messages between a workstation and a device: defined once, here, and used by both.
 //!
-//! Messages are `postcard` encodings of [`Request`] and [`Reply`] inside the frames of [`crate::frame`].
-//! `postcard` does not describe itself, so the order of variants and fields *is* the protocol:
-//! new variants go to the end, and any other change raises [`PROTOCOL_VERSION`]. The exact bytes are pinned by
-//! tests below. Every request has exactly one reply, which carries the request's sequence number; a sender may
-//! have several requests under way.
+//! Messages are `postcard` encodings of [`Request`] and [`Reply`] inside the frames of
+//! [`crate::frame`]. `postcard` does not describe itself, so the order of variants and fields *is*
+//! the protocol: new variants go to the end, and any other change raises [`PROTOCOL_VERSION`]. The
+//! exact bytes are pinned by tests below. Every request has exactly one reply, which carries the
+//! request's sequence number; a sender may have several requests under way.
 //!
 //! Pixels have (0, 0) at the center of the top-left pixel; points are in the rig's frame, mm.
 
@@ -17,7 +17,8 @@ pub const PROTOCOL_VERSION: u8 = 1;
 /// Matches in one [`Request::Measure`]: with 32 both messages stay below 1 KiB.
 pub const MAX_MATCHES: usize = 32;
 
-/// Cameras listed in a [`Status`]; a blob may hold more, [`BlobStatus::camera_count`] says how many.
+/// Cameras listed in a [`Status`]; a blob may hold more, [`BlobStatus::camera_count`] says how
+/// many.
 pub const MAX_CAMERAS_LISTED: usize = 8;
 
 /// Longest name in a message, bytes. Longer ones are cut at a character.
@@ -116,7 +117,8 @@ pub struct Status {
     pub answered: u32,
     /// Frames and requests refused since start; stops at its maximum.
     pub refused: u32,
-    /// The blob in use, or the stable code of the runtime's `OpenError` that says why there is none.
+    /// The blob in use, or the stable code of the runtime's `OpenError` that says why there is
+    /// none.
     pub blob: Result<BlobStatus, u8>,
 }
 
@@ -199,10 +201,14 @@ impl core::fmt::Display for Refusal {
             }
             Self::UnknownMessage => write!(formatter, "the frame holds no known message"),
             Self::NoBlob { open_error } => {
-                write!(
-                    formatter,
-                    "no calibration in its flash could be opened (code {open_error})"
-                )
+                // The codes are the runtime's; these are the ones that a user can act upon.
+                let reason = match open_error {
+                    2 => "its flash holds no blob",
+                    3 => "the blob in its flash is of a version that it does not read",
+                    5 => "the blob in its flash is damaged",
+                    _ => "the blob in its flash cannot be opened",
+                };
+                write!(formatter, "{reason} (code {open_error})")
             }
         }
     }

@@ -15,15 +15,16 @@ use crate::host::FLASH_LENGTH;
 /// Where the emulated flash starts in the board's memory.
 const FLASH_START: usize = 0x2100_0000;
 
-/// From the start of QEMU to the first answer of the device. It takes about a quarter of a second; the rest is for
-/// machines under load.
+/// From the start of QEMU to the first answer of the device. It takes about a quarter of a second;
+/// the rest is for machines under load.
 const START_LIMIT: Duration = Duration::from_secs(30);
 
-/// Free ports tried before giving up: between the choice of one and QEMU's use of it, somebody else may take it.
+/// Free ports tried before giving up: between the choice of one and QEMU's use of it, somebody else
+/// may take it.
 const PORT_TRIES: usize = 5;
 
-/// Runs its arguments and ends them when standard input closes. The parent holds the other end, so they end with it
-/// however it ends, a kill included.
+/// Runs its arguments and ends them when standard input closes. The parent holds the other end, so
+/// they end with it however it ends, a kill included.
 const ENDS_WITH_PARENT: &str = r#"
 exec 3<&0
 "$@" </dev/null 3<&- &
@@ -102,8 +103,8 @@ pub struct QemuDevice {
 }
 
 impl QemuDevice {
-    /// Starts `image` with its UART on `listen` (port 0 takes a free one) and the contents of `flash_file` at the
-    /// start of its flash. Returns once the device has answered.
+    /// Starts `image` with its UART on `listen` (port 0 takes a free one) and the contents of
+    /// `flash_file` at the start of its flash. Returns once the device has answered.
     ///
     /// # Errors
     /// [`QemuError`].
@@ -256,7 +257,8 @@ pub fn run_to_end(image: &Path, flash_file: Option<&Path>) -> Result<Output, Qem
     })
 }
 
-/// QEMU on this board with this image, set to end with its parent; the caller adds serial line and monitor.
+/// QEMU on this board with this image, set to end with its parent; the caller adds serial line and
+/// monitor.
 fn qemu_command(image: &Path, flash_file: Option<&Path>) -> Result<Command, QemuError> {
     let mut command = Command::new("sh");
     command.args([
@@ -275,7 +277,8 @@ fn qemu_command(image: &Path, flash_file: Option<&Path>) -> Result<Command, Qemu
             what: format!("the flash file {}", path.display()),
             source,
         };
-        // Opened as well as measured, so that one that cannot be read is found out here and not by QEMU.
+        // Opened as well as measured, so that one that cannot be read is found out here and not by
+        // QEMU.
         let length = std::fs::File::open(path)
             .and_then(|file| file.metadata())
             .map_err(unreadable)?

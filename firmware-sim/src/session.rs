@@ -2,10 +2,11 @@
 //!
 //! Whatever comes in, each of these gets exactly one answer, and nothing else gets any:
 //! - a whole frame: its reply, or a [`Reply::Refused`] under its own sequence number;
-//! - bytes up to a delimiter that are no frame (damaged, truncated, oversized): a [`Reply::Refused`] under
-//!   [`NO_SEQUENCE`](crate::frame::NO_SEQUENCE).
+//! - bytes up to a delimiter that are no frame (damaged, truncated, oversized): a
+//!   [`Reply::Refused`] under [`NO_SEQUENCE`](crate::frame::NO_SEQUENCE).
 //!
-//! A delimiter right behind another is silence, and a frame whose delimiter never comes is waited for.
+//! A delimiter right behind another is silence, and a frame whose delimiter never comes is waited
+//! for.
 
 use crate::frame::{FrameReader, FrameWriter, Received, Rejected};
 use crate::port::Link;

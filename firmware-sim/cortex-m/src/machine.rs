@@ -1,12 +1,12 @@
 //! The board's registers and memory: the one file with `unsafe` in it.
 //!
-//! It is needed for three things that the language cannot check: volatile access to device registers at
-//! fixed addresses, a view of the flash that the board maps into memory, and switching an interrupt on. Each
-//! stands in a function of its own, with the reason why it is sound.
+//! It is needed for three things that the language cannot check: volatile access to device
+//! registers at fixed addresses, a view of the flash that the board maps into memory, and switching
+//! an interrupt on. Each stands in a function of its own, with the reason why it is sound.
 //!
-//! The board is Arm's MPS2 with the AN386 image (Arm DAI 0386): CMSDK UART 0 at 0x40004000, dual timer at
-//! 0x40002000, both clocked with 25 MHz; 16 MiB of PSRAM at 0x21000000, which here stand for memory-mapped NOR
-//! flash. QEMU emulates all of them.
+//! The board is Arm's MPS2 with the AN386 image (Arm DAI 0386): CMSDK UART 0 at 0x40004000, dual
+//! timer at 0x40002000, both clocked with 25 MHz; 16 MiB of PSRAM at 0x21000000, which here stand
+//! for memory-mapped NOR flash. QEMU emulates all of them.
 #![allow(unsafe_code)]
 
 use cortex_m::interrupt::InterruptNumber;
@@ -49,8 +49,8 @@ const TIMER_32_BIT: u32 = 1 << 1;
 pub const TIMER_TICKS_IN_32_MS: u32 = 3125;
 
 fn read(register: Register) -> u32 {
-    // SAFETY: every `Register` is the address of a word-aligned device register that exists on this board. No
-    // Rust object lives there, and reading any of them cannot break memory safety.
+    // SAFETY: every `Register` is the address of a word-aligned device register that exists on this
+    // board. No Rust object lives there, and reading any of them cannot break memory safety.
     unsafe { (register as usize as *const u32).read_volatile() }
 }
 
@@ -63,7 +63,8 @@ fn write(register: Register, value: u32) {
 #[derive(Clone, Copy)]
 struct Uart0Receive;
 
-// SAFETY: AN386 wires the receiver of UART 0 to interrupt 0, which is below the 32 that its NVIC has.
+// SAFETY: AN386 wires the receiver of UART 0 to interrupt 0, which is below the 32 that its NVIC
+// has.
 unsafe impl InterruptNumber for Uart0Receive {
     fn number(self) -> u16 {
         0
@@ -72,8 +73,8 @@ unsafe impl InterruptNumber for Uart0Receive {
 
 /// Switches the UART on, with its receiver able to wake the processor.
 ///
-/// Interrupts stay masked for good: a pending one ends [`uart_wait`] without any handler, so none can come between
-/// the look at the receiver and the sleep.
+/// Interrupts stay masked for good: a pending one ends [`uart_wait`] without any handler, so none
+/// can come between the look at the receiver and the sleep.
 pub fn uart_start() {
     cortex_m::interrupt::disable();
     // The emulated line has no rate; 16 is the least divider that the UART takes.
@@ -82,7 +83,8 @@ pub fn uart_start() {
         Register::UartControl,
         CONTROL_TRANSMIT | CONTROL_RECEIVE | CONTROL_RECEIVE_INTERRUPT,
     );
-    // SAFETY: interrupts are masked, so unmasking this line starts no handler and breaks no critical section.
+    // SAFETY: interrupts are masked, so unmasking this line starts no handler and breaks no
+    // critical section.
     unsafe { NVIC::unmask(Uart0Receive) }
 }
 
@@ -99,7 +101,8 @@ pub fn uart_receive() -> Option<u8> {
 /// Sleeps until the receiver may hold a byte.
 pub fn uart_wait() {
     cortex_m::asm::wfi();
-    // The line stays pending until it is cleared here; a byte that came meanwhile is seen by the next look.
+    // The line stays pending until it is cleared here; a byte that came meanwhile is seen by the
+    // next look.
     NVIC::unpend(Uart0Receive);
 }
 
@@ -125,13 +128,15 @@ pub fn timer_ticks() -> u32 {
 
 /// The emulated flash.
 pub fn flash() -> &'static [u8] {
-    // SAFETY: the board has 16 MiB of plain memory here, outside of what `memory.x` gives to the program, so no other
-    // Rust object overlaps; nothing writes there while the image runs, and any bytes are valid `u8`.
+    // SAFETY: the board has 16 MiB of plain memory here, outside of what `memory.x` gives to the
+    // program, so no other Rust object overlaps; nothing writes there while the image runs, and any
+    // bytes are valid `u8`.
     unsafe { core::slice::from_raw_parts(FLASH_START as *const u8, FLASH_LENGTH) }
 }
 
-/// Called by the panic handler of an image that must not contain one: the function that it calls exists nowhere, so a
-/// panic that the compiler could not rule out ends the build with an undefined symbol.
+/// Called by the panic handler of an image that must not contain one: the function that it calls
+/// exists nowhere, so a panic that the compiler could not rule out ends the build with an undefined
+/// symbol.
 pub fn refuse_to_link() -> ! {
     unsafe extern "C" {
         fn a_panic_is_reachable_in_this_image() -> !;

@@ -56,8 +56,8 @@ impl BlobStore for Flash {
     }
 }
 
-/// The board's timer as the device's clock. It counts on across the timer's wrap as long as it is read at least once
-/// in 12 hours.
+/// The board's timer as the device's clock. It counts on across the timer's wrap as long as it is
+/// read at least once in 12 hours.
 #[derive(Debug)]
 pub struct Timer {
     last_ticks: u32,

@@ -76,8 +76,8 @@ fn without_a_blob_it_answers_and_says_so() {
     assert_eq!(status.blob, Err(open_error));
 }
 
-/// 20,000 rounds of noise in five kinds. Each run of bytes up to a delimiter has exactly one answer,
-/// a lone delimiter has none, and a good request right behind is answered as ever.
+/// 20,000 rounds of noise in five kinds. Each run of bytes up to a delimiter has exactly one
+/// answer, a lone delimiter has none, and a good request right behind is answered as ever.
 #[test]
 fn noise_never_stops_it() {
     let mut random = ChaCha8Rng::seed_from_u64(2);

@@ -27,7 +27,8 @@ fn framed(checked: &[u8]) -> Vec<u8> {
     frame
 }
 
-/// The bytes of a Hello, computed by hand but for the checksum, which is Python's `zlib.crc32(b"\1\7\0\0")`.
+/// The bytes of a Hello, computed by hand but for the checksum, which is Python's
+/// `zlib.crc32(b"\1\7\0\0")`.
 #[test]
 fn the_bytes_of_a_hello() {
     let crc = super::CHECKSUM.checksum(&[1, 7, 0, 0]).to_le_bytes();

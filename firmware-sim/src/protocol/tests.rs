@@ -207,3 +207,33 @@ fn a_long_name_is_cut_at_a_character() {
     let long = format!("{}äb", "n".repeat(MAX_NAME - 1));
     assert_eq!(name(&long), "n".repeat(MAX_NAME - 1).as_str());
 }
+
+/// The words for a code are tied to the runtime's numbering.
+#[test]
+fn a_refusal_for_want_of_a_blob_says_why() {
+    use ray_runtime::OpenError;
+    for (error, words) in [
+        (OpenError::BadMagic { found: 0 }, "holds no blob"),
+        (
+            OpenError::WrongVersion {
+                found: 2,
+                supported: 1,
+            },
+            "version",
+        ),
+        (
+            OpenError::BadCrc {
+                stated: 0,
+                computed: 1,
+            },
+            "damaged",
+        ),
+        (OpenError::BadHeader, "cannot be opened (code 7)"),
+    ] {
+        let text = Refusal::NoBlob {
+            open_error: error.code(),
+        }
+        .to_string();
+        assert!(text.contains(words), "{text}");
+    }
+}

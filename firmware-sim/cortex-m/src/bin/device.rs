@@ -16,7 +16,8 @@ fn main() -> ! {
     let mut device = Device::boot("firmware-sim cortex-m", &flash, Timer::start());
     let mut session = Session::new();
     loop {
-        // A UART never closes and never breaks, so one round of this lasts as long as the device is on.
+        // A UART never closes and never breaks, so one round of this lasts as long as the device is
+        // on.
         let Ok(()) = session.serve(&mut uart, &mut device);
     }
 }
