@@ -20,22 +20,22 @@ pub(crate) fn lookup(
     let v = record.axis_v().place(pixel.v, cells_v);
     let first = (record.grid_offset() >> 2) as usize;
     let knots_u = cells_u as usize + 3;
-    let ray = if record.encoding() == Encoding::CentralF32.number() {
+    let rotation = record.rotation();
+    let translation = record.translation_mm();
+    if record.encoding() == Encoding::CentralF32.number() {
         let s = evaluate::<2, 8>(words, first, knots_u, u, v).ok_or(LookupError::Outside)?;
-        Ray {
-            origin_mm: record.translation_mm().into(),
-            direction: rotate(record.rotation(), direction(s)),
-        }
+        Ok(Ray {
+            origin_mm: translation.into(),
+            direction: direction(rotation, s),
+        })
     } else {
         let [s1, s2, m1, m2] =
             evaluate::<4, 16>(words, first, knots_u, u, v).ok_or(LookupError::Outside)?;
-        let origin = rotate(record.rotation(), offset([s1, s2], [m1, m2]));
-        Ray {
-            origin_mm: Vector3::from(record.translation_mm()) + origin,
-            direction: rotate(record.rotation(), direction([s1, s2])),
-        }
-    };
-    Ok(ray)
+        Ok(Ray {
+            origin_mm: origin(rotation, translation, [s1, s2], [m1, m2]),
+            direction: direction(rotation, [s1, s2]),
+        })
+    }
 }
 
 /// Whether the pixel is in the region and in a cell of the mask that is set.
@@ -79,29 +79,32 @@ fn evaluate<const CHANNELS: usize, const ROW: usize>(
     }))
 }
 
-/// The unnormalized direction of a half-angle vector; its length is `4 + s.s`.
-fn direction([s1, s2]: [f32; 2]) -> [f32; 3] {
-    [4.0 * s1, 4.0 * s2, 4.0 - (s1 * s1 + s2 * s2)]
-}
-
-/// The offset across the ray, mm: the two axes across it, of length `4 + s.s`, times the scaled
-/// offset `m / (4 + s.s)` that the grid holds, so that nothing is divided.
-fn offset([s1, s2]: [f32; 2], [m1, m2]: [f32; 2]) -> [f32; 3] {
-    let difference = s2 * s2 - s1 * s1;
-    let product = -2.0 * (s1 * s2);
-    [
-        (4.0 + difference) * m1 + product * m2,
-        product * m1 + (4.0 - difference) * m2,
-        -4.0 * (s1 * m1 + s2 * m2),
-    ]
-}
-
-/// A row-major rotation times a vector.
-fn rotate(r: [f32; 9], [x, y, z]: [f32; 3]) -> Vector3<f32> {
+/// The unnormalized direction of a half-angle vector, `R (s1, s2, 1 - s.s/4)`; its length is
+/// `1 + s.s/4`.
+///
+/// The third column of the rotation enters by itself and what deviates from it is added last:
+/// one rounding at full magnitude instead of three.
+fn direction(r: [f32; 9], [s1, s2]: [f32; 2]) -> Vector3<f32> {
+    let drop = 0.25 * (s1 * s1 + s2 * s2);
     Vector3::new(
-        r[0] * x + r[1] * y + r[2] * z,
-        r[3] * x + r[4] * y + r[5] * z,
-        r[6] * x + r[7] * y + r[8] * z,
+        r[2] + (r[0] * s1 + r[1] * s2 - r[2] * drop),
+        r[5] + (r[3] * s1 + r[4] * s2 - r[5] * drop),
+        r[8] + (r[6] * s1 + r[7] * s2 - r[8] * drop),
+    )
+}
+
+/// Origin of the ray, mm: the two axes across it, of length `1 + s.s/4`, times the scaled offset
+/// `m / (1 + s.s/4)` that the grid holds, so that nothing is divided.
+fn origin(r: [f32; 9], t: [f32; 3], [s1, s2]: [f32; 2], [m1, m2]: [f32; 2]) -> Vector3<f32> {
+    let difference = 0.25 * (s2 * s2 - s1 * s1);
+    let product = -0.5 * (s1 * s2);
+    let x = m1 + (difference * m1 + product * m2);
+    let y = m2 + (product * m1 - difference * m2);
+    let z = -(s1 * m1 + s2 * m2);
+    Vector3::new(
+        t[0] + (r[0] * x + r[1] * y + r[2] * z),
+        t[1] + (r[3] * x + r[4] * y + r[5] * z),
+        t[2] + (r[6] * x + r[7] * y + r[8] * z),
     )
 }
 
@@ -109,11 +112,33 @@ fn rotate(r: [f32; 9], [x, y, z]: [f32; 3]) -> Vector3<f32> {
 mod tests {
     use super::*;
 
+    const IDENTITY: [f32; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+
     #[test]
     fn ninety_degrees_off_axis_looks_sideways_and_its_offset_is_across() {
-        assert_eq!(direction([2.0, 0.0]), [8.0, 0.0, 0.0]);
-        // Axes across: -z and y, each of length 8.
-        assert_eq!(offset([2.0, 0.0], [1.0, 0.0]), [0.0, 0.0, -8.0]);
-        assert_eq!(offset([2.0, 0.0], [0.0, 1.0]), [0.0, 8.0, 0.0]);
+        let sideways = [2.0, 0.0];
+        assert_eq!(direction(IDENTITY, sideways), Vector3::new(2.0, 0.0, 0.0));
+        // The axes across are -z and y, each of length 2.
+        let at = [10.0, 20.0, 30.0];
+        assert_eq!(
+            origin(IDENTITY, at, sideways, [1.0, 0.0]),
+            Vector3::new(10.0, 20.0, 28.0)
+        );
+        assert_eq!(
+            origin(IDENTITY, at, sideways, [0.0, 1.0]),
+            Vector3::new(10.0, 22.0, 30.0)
+        );
+    }
+
+    #[test]
+    fn rotation_is_row_major() {
+        // x to y, y to z, z to x.
+        let turn = [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+        assert_eq!(direction(turn, [0.0, 0.0]), Vector3::x());
+        assert_eq!(direction(turn, [2.0, 0.0]), Vector3::y() * 2.0);
+        assert_eq!(
+            origin(turn, [0.0; 3], [0.0, 0.0], [1.0, 2.0]),
+            Vector3::new(0.0, 1.0, 2.0)
+        );
     }
 }

@@ -24,6 +24,6 @@ pub struct Ray {
     /// The point of the ray nearest to its camera's reference point (its foot point), mm. The
     /// rays of a central camera all start in the same point.
     pub origin_mm: Vector3<f32>,
-    /// From the camera into the scene, not normalized: its length is between 4 and 20.
+    /// From the camera into the scene, not normalized: its length is between 1 and 5.
     pub direction: Vector3<f32>,
 }

@@ -4,8 +4,9 @@ use super::PackError;
 use super::field_rows::FieldRows;
 use crate::field::CalibratedCamera;
 use crate::field::spline::{AxisWeights, SplineGrid};
-use crate::field::transport::MAX_HALF_ANGLE_LENGTH;
+use crate::field::transport::{self, MAX_HALF_ANGLE_LENGTH};
 use crate::geometry::PixelPoint;
+use nalgebra::{Matrix3, Vector2};
 use ray_runtime::format::{self, Encoding};
 
 /// A camera's field as the runtime evaluates it: knots of a uniform bicubic B-spline whose cells
@@ -16,7 +17,7 @@ pub struct ControlGrid {
     pub cells: [u32; 2],
     /// How the knots are stored.
     pub encoding: Encoding,
-    /// Row-major: the half-angle vector and, if not central, `m / (4 + s.s)` in mm.
+    /// Row-major: the half-angle vector and, if not central, `m / (1 + s.s/4)` in mm.
     pub knots: Vec<[f64; 4]>,
 }
 
@@ -56,6 +57,7 @@ pub fn fit(camera: &CalibratedCamera, cells: [u32; 2]) -> Result<ControlGrid, Pa
     let mut system = BandedSystem::new(grid.knot_count(), order.half_bandwidth());
     add_thin_plate(&mut system, &grid, &order);
 
+    let turn = RoundingTurn::new(&camera.rig_from_camera.rotation);
     let rows = FieldRows::new(field, lattice.u_px.clone());
     let weights_u: Vec<_> = lattice.u_px.iter().map(|u| grid.weights_u(*u)).collect();
     for (row_idx, &v) in lattice.v_px.iter().enumerate() {
@@ -78,8 +80,9 @@ pub fn fit(camera: &CalibratedCamera, cells: [u32; 2]) -> Result<ControlGrid, Pa
                 });
             }
             if is_usable {
-                let m = sample.m_mm / (4.0 + length_squared);
-                let value = [sample.s.x, sample.s.y, m.x, m.y];
+                let m = sample.m_mm / (1.0 + length_squared / 4.0);
+                let s = turn.applied(&sample.s);
+                let value = [s.x, s.y, m.x, m.y];
                 system.add_point(&order, weights_u, &weights_v, weight, value);
             }
         }
@@ -101,6 +104,28 @@ pub fn fit(camera: &CalibratedCamera, cells: [u32; 2]) -> Result<ControlGrid, Pa
         },
         knots,
     })
+}
+
+/// What the rotation of a camera loses when it is rounded to f32, some 1e-8 rad: the grid can
+/// make up for it, and at a focal length of 6000 px that is half of what a blob may be off.
+struct RoundingTurn {
+    rounded_from_exact: Matrix3<f64>,
+}
+
+impl RoundingTurn {
+    fn new(rotation: &Matrix3<f64>) -> Self {
+        let rounded = rotation.map(|x| f64::from(x as f32));
+        // A matrix without inverse is refused when the blob is opened.
+        let inverse = rounded.try_inverse().unwrap_or_else(Matrix3::identity);
+        Self {
+            rounded_from_exact: inverse * rotation,
+        }
+    }
+
+    /// The half-angle vector that the rounded rotation takes where the exact one takes `s`.
+    fn applied(&self, s: &Vector2<f64>) -> Vector2<f64> {
+        transport::half_angle(&(self.rounded_from_exact * transport::direction(s))).unwrap_or(*s)
+    }
 }
 
 /// Where the field is sampled, and what each sample counts.

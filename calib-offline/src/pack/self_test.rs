@@ -90,7 +90,7 @@ fn device_pixel(pixel: PixelPoint) -> ray_runtime::PixelPoint {
 
 /// A quarter pixel whose ray passes near a point (rig frame, mm); `None` if there is none in the
 /// calibrated area. Near is enough: two rays that miss each other have a point too.
-fn pixel_nearest(camera: &CalibratedCamera, point_in_rig: &Vector3<f64>) -> Option<PixelPoint> {
+pub fn pixel_nearest(camera: &CalibratedCamera, point_in_rig: &Vector3<f64>) -> Option<PixelPoint> {
     const STEPS: u32 = 16;
     let point = camera.rig_from_camera.inverse().point(point_in_rig);
     let sensor = camera.field.sensor;

@@ -1,0 +1,254 @@
+//! Blobs made by hand from the schema, so that they can also be made wrong.
+
+// Each test program uses a part of this.
+#![allow(dead_code)]
+
+use ray_runtime::format::{
+    self, Axis, CameraMeta, Encoding, HEADER_LEN, Header, LengthUnit, Meta, PixelConvention,
+    RECORD_LEN, RecordFields, SelfTest, VERSION,
+};
+
+/// Bytes that start on a multiple of 8.
+pub struct AlignedBytes {
+    words: Vec<u64>,
+    start: usize,
+    len: usize,
+}
+
+impl AlignedBytes {
+    pub fn new(bytes: &[u8]) -> Self {
+        Self::shifted(bytes, 0)
+    }
+
+    /// Bytes that start `shift` after a multiple of 8.
+    pub fn shifted(bytes: &[u8], shift: usize) -> Self {
+        let mut words = vec![0u64; (bytes.len() + shift).div_ceil(8) + 1];
+        let all: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
+        all[shift..shift + bytes.len()].copy_from_slice(bytes);
+        Self {
+            words,
+            start: shift,
+            len: bytes.len(),
+        }
+    }
+
+    pub fn bytes(&self) -> &[u8] {
+        &bytemuck::cast_slice(&self.words)[self.start..self.start + self.len]
+    }
+
+    pub fn bytes_mut(&mut self) -> &mut [u8] {
+        &mut bytemuck::cast_slice_mut(&mut self.words)[self.start..self.start + self.len]
+    }
+}
+
+/// A camera whose half-angle vector is linear in the pixel: the spline reproduces it.
+#[derive(Clone)]
+pub struct TestCamera {
+    pub name: &'static str,
+    pub sensor: [u32; 2],
+    /// First column and row, columns and rows.
+    pub region: [u32; 4],
+    pub cells: [u32; 2],
+    pub mask_cells: [u32; 2],
+    pub mask: Vec<bool>,
+    pub encoding: Encoding,
+    /// s = (pixel - center of the sensor) / focal_px.
+    pub focal_px: f32,
+    /// Scaled offset, the same for every pixel, mm.
+    pub offset_mm: [f32; 2],
+    pub rotation: [f32; 9],
+    pub translation_mm: [f32; 3],
+}
+
+pub const IDENTITY: [f32; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+
+impl TestCamera {
+    pub fn new(name: &'static str, x_mm: f32) -> Self {
+        Self {
+            name,
+            sensor: [64, 48],
+            region: [0, 0, 64, 48],
+            cells: [3, 2],
+            mask_cells: [4, 3],
+            mask: vec![true; 12],
+            encoding: Encoding::CentralF32,
+            focal_px: 50.0,
+            offset_mm: [0.0; 2],
+            rotation: IDENTITY,
+            translation_mm: [x_mm, 0.0, 0.0],
+        }
+    }
+
+    fn meta(&self) -> CameraMeta<'_> {
+        let [region_u, region_v, region_width, region_height] = self.region;
+        CameraMeta {
+            name: self.name,
+            sensor_width: self.sensor[0],
+            sensor_height: self.sensor[1],
+            region_u,
+            region_v,
+            region_width,
+            region_height,
+        }
+    }
+
+    /// Half-angle vector at a pixel.
+    pub fn s(&self, u: f32, v: f32) -> [f32; 2] {
+        let center = |extent: u32| extent as f32 / 2.0 - 0.5;
+        [
+            (u - center(self.sensor[0])) / self.focal_px,
+            (v - center(self.sensor[1])) / self.focal_px,
+        ]
+    }
+
+    fn grid(&self) -> Vec<u8> {
+        let [u0, v0, width, height] = self.region.map(|x| x as f32);
+        let [cells_u, cells_v] = self.cells;
+        let mut bytes = Vec::new();
+        for j in 0..cells_v + 3 {
+            for i in 0..cells_u + 3 {
+                // A B-spline whose knots hold a linear function is that linear function.
+                let u = u0 - 0.5 + (i as f32 - 1.0) * width / cells_u as f32;
+                let v = v0 - 0.5 + (j as f32 - 1.0) * height / cells_v as f32;
+                let [s1, s2] = self.s(u, v);
+                let numbers = [s1, s2, self.offset_mm[0], self.offset_mm[1]];
+                for number in &numbers[..self.encoding.channels()] {
+                    bytes.extend(number.to_le_bytes());
+                }
+            }
+        }
+        bytes
+    }
+
+    fn mask_bytes(&self) -> Vec<u8> {
+        let mut bytes = vec![0; format::mask_len(self.mask_cells)];
+        for (k, _) in self.mask.iter().enumerate().filter(|(_, set)| **set) {
+            bytes[k / 8] |= 1 << (k % 8);
+        }
+        bytes
+    }
+}
+
+/// The parts of a blob, each of which a test may spoil.
+pub struct TestBlob {
+    pub cameras: Vec<TestCamera>,
+    pub max_error_px: f32,
+    pub identity: Vec<u8>,
+    pub self_tests: Vec<SelfTest>,
+}
+
+impl TestBlob {
+    pub fn new(cameras: Vec<TestCamera>) -> Self {
+        Self {
+            cameras,
+            max_error_px: 0.001,
+            identity: (0..16).collect(),
+            self_tests: Vec::new(),
+        }
+    }
+
+    pub fn bytes(&self) -> AlignedBytes {
+        let meta = Meta {
+            identity: &self.identity,
+            frame: "test",
+            written_by: "hand",
+            pixel_convention: PixelConvention::TopLeftPixelCenter,
+            length_unit: LengthUnit::Millimeter,
+            max_error_px: self.max_error_px,
+            working_distance_mm: 500.0,
+            self_test_count: self.self_tests.len() as u16,
+        };
+        let mut metadata: Vec<u8> = postcard::to_extend(&meta, Vec::new()).unwrap();
+        for camera in &self.cameras {
+            metadata = postcard::to_extend(&camera.meta(), metadata).unwrap();
+        }
+        for test in &self.self_tests {
+            metadata = postcard::to_extend(test, metadata).unwrap();
+        }
+        let records_start = format::aligned(HEADER_LEN + metadata.len());
+        let tables_start = records_start + self.cameras.len() * RECORD_LEN;
+        let (mut records, mut tables) = (Vec::new(), Vec::new());
+        for camera in &self.cameras {
+            let grid_offset = (tables_start + tables.len()) as u32;
+            tables.extend(camera.grid());
+            pad(&mut tables);
+            let mask_offset = (tables_start + tables.len()) as u32;
+            tables.extend(camera.mask_bytes());
+            pad(&mut tables);
+            let fields = RecordFields {
+                encoding: camera.encoding.number(),
+                cells: camera.cells,
+                mask_cells: camera.mask_cells,
+                grid_offset,
+                mask_offset,
+                axes: [0, 1].map(|k| {
+                    Axis::new(
+                        camera.region[k],
+                        camera.region[k + 2],
+                        camera.cells[k],
+                        camera.mask_cells[k],
+                    )
+                }),
+                rotation: camera.rotation,
+                translation_mm: camera.translation_mm,
+            };
+            records.extend(fields.to_words().iter().flat_map(|w| w.to_le_bytes()));
+        }
+        let header = Header {
+            version: VERSION,
+            header_len: HEADER_LEN as u16,
+            total_len: (tables_start + tables.len()) as u32,
+            crc: 0,
+            meta_len: metadata.len() as u32,
+            camera_count: self.cameras.len() as u16,
+        };
+        let mut blob = header.to_bytes().to_vec();
+        blob.extend(metadata);
+        pad(&mut blob);
+        blob.extend(records);
+        blob.extend(tables);
+        repair_checksum(&mut blob);
+        AlignedBytes::new(&blob)
+    }
+}
+
+fn pad(bytes: &mut Vec<u8>) {
+    bytes.resize(format::aligned(bytes.len()), 0);
+}
+
+/// Makes the checksum fit what the bytes are.
+pub fn repair_checksum(blob: &mut [u8]) {
+    if let Some(crc) = format::checksum(blob) {
+        blob[12..16].copy_from_slice(&crc.to_le_bytes());
+    }
+}
+
+/// Where the records start, read from the header.
+pub fn records_start(blob: &[u8]) -> usize {
+    let (_, header) = Header::read(blob).unwrap();
+    format::aligned(HEADER_LEN + header.meta_len as usize)
+}
+
+/// SplitMix64: a seeded sequence that is the same everywhere.
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// From 0 up to `end`, not included.
+    pub fn below(&mut self, end: usize) -> usize {
+        (self.next() % end as u64) as usize
+    }
+
+    /// Between `low` and `high`.
+    pub fn between(&mut self, low: f32, high: f32) -> f32 {
+        let unit = (self.next() >> 40) as f32 / (1u64 << 24) as f32;
+        low + (high - low) * unit
+    }
+}
