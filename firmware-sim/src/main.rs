@@ -89,12 +89,11 @@ fn run_on_host(arguments: &DeviceArguments) -> anyhow::Result<()> {
 fn run_in_qemu(arguments: &DeviceArguments, image: Option<&Path>) -> anyhow::Result<()> {
     // Before the image, whose first build takes a minute.
     qemu::require_qemu()?;
-    let image = match image {
-        Some(path) => path.to_owned(),
-        None => {
-            eprintln!("firmware-sim: building the image, unless it is up to date");
-            qemu::build_image("device")?
-        }
+    let image = if let Some(path) = image {
+        path.to_owned()
+    } else {
+        eprintln!("firmware-sim: building the image, unless it is up to date");
+        qemu::build_image("device")?
     };
     let device = QemuDevice::start(arguments.listen, &image, arguments.flash_file.as_deref())?;
     announce(device.address())?;

@@ -105,7 +105,7 @@ fn grid(camera: usize, encoding: Encoding) -> Vec<u8> {
     for row in 0..CELLS[1] + 3 {
         for col in 0..CELLS[0] + 3 {
             let mut from_center = |index: u32, cells: u32| {
-                0.06 * (index as f32 - (cells as f32 + 2.0) / 2.0)
+                0.06 * (index as f32 - (cells + 2) as f32 / 2.0)
                     + random.random_range(-0.004..0.004_f32)
             };
             let mut knot = vec![from_center(col, CELLS[0]), from_center(row, CELLS[1])];

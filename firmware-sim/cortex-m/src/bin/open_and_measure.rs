@@ -1,5 +1,5 @@
-//! Opens the blob at the start of the flash and triangulates a few matches of cameras 0 and 1. The
-//! numbers are printed with all the digits that tell their bits apart.
+//! Opens the blob at the start of the flash, runs its self-tests, which compare bits, and
+//! triangulates a few matches of cameras 0 and 1, printed to a tenth of a millimeter.
 
 #![no_std]
 #![no_main]
@@ -47,17 +47,18 @@ fn main() -> ! {
             camera.sensor_height
         );
     }
+    match blob.run_self_tests() {
+        Ok(count) => hprintln!("{} self-tests give the bits they should", count),
+        Err(failure) => {
+            hprintln!("self-test {} gives other bits", failure.test);
+            exit(debug::EXIT_FAILURE)
+        }
+    }
     for [u0, v0, u1, v1] in MATCHES {
         match blob.triangulate((0, PixelPoint::new(u0, v0)), (1, PixelPoint::new(u1, v1))) {
             Ok(found) => {
                 let [x, y, z]: [f32; 3] = found.point_mm.into();
-                hprintln!(
-                    "point {} {} {} mm, gap squared {} mm2",
-                    x,
-                    y,
-                    z,
-                    found.gap_squared_mm2
-                );
+                hprintln!("point {:.1} {:.1} {:.1} mm, gap {:.1} mm", x, y, z, found.gap_mm());
             }
             Err(error) => hprintln!("{}", error),
         }
