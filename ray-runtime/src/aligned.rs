@@ -7,8 +7,10 @@
 /// ```
 /// use ray_runtime::{Aligned, RayBlob};
 ///
-/// static RIG: &Aligned<[u8]> =
-///     &Aligned(*include_bytes!("../../data/golden/stereo-v1.rays"));
+/// static RIG: &Aligned<[u8]> = &Aligned(*include_bytes!(concat!(
+///     env!("CARGO_MANIFEST_DIR"),
+///     "/../data/golden/stereo-v1.rays"
+/// )));
 ///
 /// let rig = RayBlob::open(&RIG.0).unwrap();
 /// assert_eq!(rig.camera_count(), 2);

@@ -211,7 +211,7 @@ pub fn pack(rig: &Rig, settings: &PackSettings) -> Result<Packed, PackError> {
         let mut is_proven = true;
         for (idx, camera) in rig.cameras.iter().enumerate() {
             let worst_px = proofs[idx].worst_error_px;
-            if !(worst_px <= settings.max_error_px) {
+            if worst_px > settings.max_error_px {
                 chosen[idx].refine(camera, settings, worst_px)?;
                 is_proven = false;
             }

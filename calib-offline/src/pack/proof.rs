@@ -90,8 +90,7 @@ impl Proof {
     }
 
     fn merged(self, other: Self) -> Self {
-        // An error that is no number is the worst.
-        let is_worse = !(other.worst_error_px <= self.worst_error_px);
+        let is_worse = other.worst_error_px > self.worst_error_px;
         let sum_of_squares = |p: &Self| p.rms_error_px * p.rms_error_px * p.pixel_count as f64;
         let count = self.pixel_count + other.pixel_count;
         let sum = sum_of_squares(&self) + sum_of_squares(&other);
@@ -121,7 +120,7 @@ impl Judge<'_> {
         let local_from_rig = transport::frame(&exact.s).transpose() * turned_back;
         let origin = local_from_rig * origin;
         let direction = local_from_rig * ray.direction.map(f64::from);
-        if !(direction.z > 0.0) {
+        if direction.z <= 0.0 {
             return f64::INFINITY;
         }
         let slope = direction.xy() / direction.z;
@@ -129,7 +128,14 @@ impl Judge<'_> {
         // Where the ray crosses the plane through the reference point.
         let offset_error_mm = origin.xy() - slope * origin.z - exact.m_mm;
         let px_from_mm = px_from_mm(exact, self.working_distance_mm);
-        self.in_px(px_from_mm, direction_error_mm) + self.in_px(px_from_mm, offset_error_mm)
+        let error_px =
+            self.in_px(px_from_mm, direction_error_mm) + self.in_px(px_from_mm, offset_error_mm);
+        // A field that is no number somewhere cannot have been packed.
+        if error_px.is_nan() {
+            f64::INFINITY
+        } else {
+            error_px
+        }
     }
 
     fn in_px(&self, px_from_mm: Option<Matrix2<f64>>, error_mm: Vector2<f64>) -> f64 {

@@ -52,7 +52,7 @@ pub struct TestCamera {
     pub mask_cells: [u32; 2],
     pub mask: Vec<bool>,
     pub encoding: Encoding,
-    /// s = (pixel - center of the sensor) / focal_px.
+    /// The half-angle vector is the pixel's offset from the sensor's center divided by this.
     pub focal_px: f32,
     /// Scaled offset, the same for every pixel, mm.
     pub offset_mm: [f32; 2],
@@ -229,7 +229,7 @@ pub fn records_start(blob: &[u8]) -> usize {
     format::aligned(HEADER_LEN + header.meta_len as usize)
 }
 
-/// SplitMix64: a seeded sequence that is the same everywhere.
+/// `SplitMix64`: a seeded sequence that is the same everywhere.
 pub struct Random(pub u64);
 
 impl Random {

@@ -1,0 +1,110 @@
+//! The golden blob of format version 1: the packer writes today what it wrote then.
+//!
+//! `UPDATE_GOLDEN=1 cargo test --release -p calib-offline --test golden_blob` writes the file
+//! anew. That is right only if the packer was meant to change; a new format version gets a file
+//! of its own, and the old one stays.
+
+use calib_offline::field::spline::{Spline, SplineGrid};
+use calib_offline::field::{
+    BaseLens, CalibratedCamera, CoverageMask, Projection, RayField, Rig, SmoothMap,
+};
+use calib_offline::geometry::{PixelPoint, RigidTransform, SensorSize};
+use calib_offline::pack::{AlignedBytes, PackSettings, pack, read_aligned};
+use nalgebra::{Matrix3, Vector2, Vector3};
+use ray_runtime::RayBlob;
+use std::path::Path;
+
+const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../data/golden/stereo-v1.rays");
+
+/// A rotation about y by an angle with this sine and cosine.
+fn yaw(sin: f64, cos: f64) -> Matrix3<f64> {
+    Matrix3::new(cos, 0.0, sin, 0.0, 1.0, 0.0, -sin, 0.0, cos)
+}
+
+/// A central camera with a spline, calibrated in part, and one that is not central. Only sums,
+/// products, quotients and square roots go into them, so that every machine packs the same bits.
+fn golden_rig() -> Rig {
+    let sensor = SensorSize::new(64, 48);
+    let base = BaseLens {
+        projection: Projection::Perspective,
+        focal_px: 60.0,
+    };
+    let mut left = RayField::ideal(sensor, base, 3);
+    left.direction.polynomial.coefficients[7] = Vector2::new(0.01, -0.005);
+    let mut spline = Spline::zero(SplineGrid {
+        sensor,
+        cells_u: 4,
+        cells_v: 3,
+    });
+    for (k, c) in spline.coefficients.iter_mut().enumerate() {
+        *c = Vector2::new((k % 5) as f64 - 2.0, (k % 3) as f64 - 1.0) / 500.0;
+    }
+    left.direction.spline = Some(spline);
+
+    let mut right = RayField::ideal(sensor, base, 3);
+    let mut offset = SmoothMap::zero(2);
+    for (k, c) in offset.polynomial.coefficients.iter_mut().enumerate() {
+        *c = Vector2::new(0.5 - k as f64 / 8.0, k as f64 / 16.0);
+    }
+    right.offset = Some(offset);
+
+    let hull = [(4.0, 3.0), (60.0, 5.0), (58.0, 44.0), (8.0, 40.0)];
+    let corners = hull.iter().map(|(u, v)| PixelPoint::new(*u, *v));
+    Rig {
+        cameras: vec![
+            CalibratedCamera {
+                name: "left".into(),
+                field: left,
+                coverage: CoverageMask::from_corners(sensor, corners),
+                rig_from_camera: RigidTransform::new(
+                    yaw(0.28, 0.96),
+                    Vector3::new(-140.0, 0.0, -480.0),
+                ),
+            },
+            CalibratedCamera {
+                name: "right".into(),
+                field: right,
+                coverage: CoverageMask::uniform(sensor, true),
+                rig_from_camera: RigidTransform::new(
+                    yaw(-0.28, 0.96),
+                    Vector3::new(140.0, 0.0, -480.0),
+                ),
+            },
+        ],
+        datum_pose: 0,
+    }
+}
+
+#[test]
+fn the_packer_still_writes_the_golden_blob() {
+    let settings = PackSettings {
+        max_error_px: 0.002,
+        working_distance_mm: 500.0,
+        identity: *b"golden stereo v1",
+    };
+    let packed = pack(&golden_rig(), &settings).unwrap();
+    if std::env::var_os("UPDATE_GOLDEN").is_some() {
+        std::fs::write(PATH, &packed.bytes).unwrap();
+    }
+    let golden = read_aligned(Path::new(PATH)).unwrap();
+    let (golden, now) = (
+        RayBlob::open(&golden).unwrap(),
+        AlignedBytes::from(packed.bytes.as_slice()),
+    );
+    // The program's version stands in the blob; what it computes must not depend on it.
+    let fresh = RayBlob::open(&now).unwrap();
+    for camera in 0..2 {
+        assert_eq!(golden.camera(camera), fresh.camera(camera));
+        for v in 0..48 {
+            for u in 0..64 {
+                let pixel = ray_runtime::PixelPoint::new(u as f32, v as f32);
+                assert_eq!(golden.lookup(camera, pixel), fresh.lookup(camera, pixel));
+            }
+        }
+    }
+    assert!(golden.self_tests().eq(fresh.self_tests()));
+    assert_eq!(golden.max_error_px(), fresh.max_error_px());
+    if golden.written_by() == fresh.written_by() {
+        assert_eq!(std::fs::read(PATH).unwrap(), packed.bytes);
+    }
+}
