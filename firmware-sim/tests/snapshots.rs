@@ -1,9 +1,7 @@
 //! Every check image `cortex-m/src/bin/NAME.rs` with a `NAME.out` beside it, run in QEMU and
-//! compared with that file. With `OVERWRITE=1` in the environment, what was printed is accepted.
+//! compared with that file. Their flash holds the golden blob. With `OVERWRITE=1` in the
+//! environment, what was printed is accepted.
 
-mod rig;
-
-use std::io::Write;
 use std::path::Path;
 
 use firmware_sim::qemu;
@@ -12,8 +10,7 @@ use firmware_sim::qemu;
 fn check_images_print_what_they_should() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("cortex-m/src/bin");
     let overwrite = std::env::var_os("OVERWRITE").is_some_and(|value| value == "1");
-    let mut flash = tempfile::NamedTempFile::new().unwrap();
-    flash.write_all(&rig::blob()).unwrap();
+    let flash = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/golden/stereo-v1.rays");
 
     let mut compared = 0;
     for entry in std::fs::read_dir(&folder).unwrap() {
@@ -26,7 +23,7 @@ fn check_images_print_what_they_should() {
         }
         let name = expected_file.file_stem().unwrap().to_str().unwrap();
         let image = qemu::build_image(name).unwrap();
-        let output = qemu::run_to_end(&image, Some(flash.path())).unwrap();
+        let output = qemu::run_to_end(&image, Some(&flash)).unwrap();
         let printed = String::from_utf8(output.stdout).unwrap();
         assert!(
             output.status.success(),

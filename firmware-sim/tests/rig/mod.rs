@@ -1,7 +1,5 @@
 //! A stereo blob made by hand from the runtime's schema, and matches on it: small, but with a
 //! central and a non-central camera, knots that no formula gives, and a hole in a mask.
-// Each test program is a crate of its own and takes from here what it needs.
-#![allow(dead_code)]
 
 use firmware_sim::protocol::{Match, Sighting};
 use rand::{RngExt, SeedableRng};

@@ -11,14 +11,14 @@ use ray_runtime::{PixelPoint, RayBlob};
 
 /// (u, v) in camera 0 and in camera 1, px.
 const MATCHES: [[f32; 4]; 6] = [
-    [320.0, 240.0, 250.0, 240.5],
-    [100.25, 400.75, 60.5, 401.0],
-    [600.0, 20.0, 480.0, 19.0],
-    // Seen further right by the right camera than by the left one: the rays meet behind them.
-    [300.0, 250.0, 500.0, 250.0],
+    [23.75, 19.75, 25.0, 20.0],
+    [51.75, 11.0, 49.0, 8.5],
+    [18.5, 37.0, 20.25, 35.5],
+    // Seen too far to the right by the right camera: the rays meet behind them.
+    [10.0, 24.0, 60.0, 24.0],
     // Outside the sensor, and no number.
-    [-1.0, 100.0, 50.0, 100.0],
-    [f32::NAN, 100.0, 50.0, 100.0],
+    [-1.0, 24.0, 20.0, 24.0],
+    [f32::NAN, 24.0, 20.0, 24.0],
 ];
 
 #[entry]
