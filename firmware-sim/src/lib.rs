@@ -1,2 +1,16 @@
-//! Device.
+#![doc = include_str!("../README.md")]
 #![cfg_attr(not(feature = "std"), no_std)]
+
+pub mod app;
+pub mod cobs;
+pub mod frame;
+pub mod port;
+pub mod protocol;
+pub mod session;
+
+#[cfg(feature = "std")]
+pub mod client;
+#[cfg(feature = "std")]
+pub mod host;
+#[cfg(feature = "std")]
+pub mod qemu;

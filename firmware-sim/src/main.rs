@@ -1,1 +1,111 @@
-fn main() {}
+//! The command line of the simulated device.
+
+use std::io::Write;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::Context;
+use clap::{Parser, Subcommand};
+use firmware_sim::host::SimulatedDevice;
+use firmware_sim::qemu::{self, QemuDevice};
+
+/// A measuring device, simulated.
+///
+/// Example: firmware-sim host --listen 127.0.0.1:7777 --flash-file rig.rays
+#[derive(Parser)]
+#[command(version)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// The device on this computer.
+    Host(DeviceArguments),
+    /// The same application as a Cortex-M4F image in QEMU; the image is built first when it is
+    /// missing or stale.
+    Qemu {
+        #[command(flatten)]
+        device: DeviceArguments,
+        /// Run this image instead of building one.
+        #[arg(long, value_name = "ELF")]
+        image: Option<PathBuf>,
+    },
+}
+
+#[derive(clap::Args)]
+struct DeviceArguments {
+    /// Where to listen: ADDRESS:PORT, or PORT on the loopback interface. Port 0 picks a free one.
+    /// The first line on standard output says which.
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:0", value_parser = listen_address)]
+    listen: SocketAddr,
+    /// What the device's flash holds from its start, such as a blob that `calib-offline calibrate`
+    /// wrote. Without it the flash is empty.
+    #[arg(long, value_name = "FILE")]
+    flash_file: Option<PathBuf>,
+}
+
+fn listen_address(text: &str) -> Result<SocketAddr, String> {
+    if let Ok(port) = text.parse::<u16>() {
+        return Ok(SocketAddr::from((Ipv4Addr::LOCALHOST, port)));
+    }
+    text.parse()
+        .map_err(|_| "give ADDRESS:PORT, such as 127.0.0.1:7777, or a port alone".to_owned())
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("firmware-sim: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    match &arguments.command {
+        Command::Host(device) => run_on_host(device),
+        Command::Qemu { device, image } => run_in_qemu(device, image.as_deref()),
+    }
+}
+
+fn run_on_host(arguments: &DeviceArguments) -> anyhow::Result<()> {
+    let flash = match &arguments.flash_file {
+        Some(path) => {
+            std::fs::read(path).with_context(|| format!("the flash file {}", path.display()))?
+        }
+        None => Vec::new(),
+    };
+    let device = SimulatedDevice::start(arguments.listen, &flash)
+        .with_context(|| format!("the device on {}", arguments.listen))?;
+    announce(device.address())?;
+    device.serve_forever();
+    anyhow::bail!("the device stopped")
+}
+
+fn run_in_qemu(arguments: &DeviceArguments, image: Option<&Path>) -> anyhow::Result<()> {
+    // Before the image, whose first build takes a minute.
+    qemu::require_qemu()?;
+    let image = if let Some(path) = image {
+        path.to_owned()
+    } else {
+        eprintln!("firmware-sim: building the image, unless it is up to date");
+        qemu::build_image("device")?
+    };
+    let device = QemuDevice::start(arguments.listen, &image, arguments.flash_file.as_deref())?;
+    announce(device.address())?;
+    let status = device.wait()?;
+    anyhow::bail!("QEMU stopped ({status})")
+}
+
+/// Says where the device can be reached. Whoever started this program may wait for the line, so it
+/// must get out.
+fn announce(address: SocketAddr) -> anyhow::Result<()> {
+    let mut output = std::io::stdout();
+    writeln!(output, "listening on {address}")
+        .and_then(|()| output.flush())
+        .context("standard output")
+}

@@ -1,0 +1,334 @@
+//! The same application as a Cortex-M4F image in QEMU, its UART on a TCP port.
+
+use std::io::ErrorKind;
+use std::net::{SocketAddr, TcpListener};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Output, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use thiserror::Error;
+
+use crate::client::{ClientError, DeviceClient};
+use crate::host::FLASH_LENGTH;
+
+/// Where the emulated flash starts in the board's memory.
+const FLASH_START: usize = 0x2100_0000;
+
+/// From the start of QEMU to the first answer of the device. It takes about a quarter of a second;
+/// the rest is for machines under load.
+const START_LIMIT: Duration = Duration::from_secs(30);
+
+/// Free ports tried before giving up: between the choice of one and QEMU's use of it, somebody else
+/// may take it.
+const PORT_TRIES: usize = 5;
+
+/// Runs its arguments and ends them when standard input closes. The parent holds the other end, so
+/// they end with it however it ends, a kill included.
+const ENDS_WITH_PARENT: &str = r#"
+exec 3<&0
+"$@" </dev/null 3<&- &
+child=$!
+{ read -r _ <&3; kill -KILL $child; } 2>/dev/null &
+watchdog=$!
+{ wait $child; } 2>/dev/null
+status=$?
+kill -KILL $watchdog 2>/dev/null
+exit $status
+"#;
+
+/// Why there is no device in QEMU.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum QemuError {
+    /// QEMU is not installed.
+    #[error(
+        "qemu-system-arm is not installed: apt-get install qemu-system-arm, or run scripts/install-embedded.sh"
+    )]
+    NotInstalled,
+    /// The sources of the image are not where this program was built.
+    #[error("no sources for the image at {}: run from a checkout, or give an image with --image", path.display())]
+    NoSources {
+        /// The folder looked for.
+        path: PathBuf,
+    },
+    /// The image could not be built.
+    #[error("the image `{image}` could not be built ({status}): see the messages above")]
+    Build {
+        /// Its name.
+        image: String,
+        /// How the build ended.
+        status: ExitStatus,
+    },
+    /// A program could not be started, or a file not be read.
+    #[error("{what}")]
+    Io {
+        /// Program or file.
+        what: String,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The contents for the flash are too long.
+    #[error("{} has {length} bytes, and the flash only {FLASH_LENGTH}", path.display())]
+    FlashTooLong {
+        /// The file.
+        path: PathBuf,
+        /// Its length, bytes.
+        length: u64,
+    },
+    /// The address cannot be listened on.
+    #[error("cannot listen on {address}")]
+    Listen {
+        /// As given.
+        address: SocketAddr,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// QEMU ended before the device answered.
+    #[error("QEMU ended before the device answered ({status}): see its message above")]
+    Ended {
+        /// How.
+        status: ExitStatus,
+    },
+    /// The device did not answer.
+    #[error("QEMU runs, but the device in it does not answer")]
+    Silent(#[source] ClientError),
+}
+
+/// A device in QEMU. It ends when this is dropped, and when this process ends in any way.
+#[derive(Debug)]
+pub struct QemuDevice {
+    child: Child,
+    address: SocketAddr,
+}
+
+impl QemuDevice {
+    /// Starts `image` with its UART on `listen` (port 0 takes a free one) and the contents of
+    /// `flash_file` at the start of its flash. Returns once the device has answered.
+    ///
+    /// # Errors
+    /// [`QemuError`].
+    pub fn start(
+        listen: SocketAddr,
+        image: &Path,
+        flash_file: Option<&Path>,
+    ) -> Result<Self, QemuError> {
+        require_qemu()?;
+        let tries = if listen.port() == 0 { PORT_TRIES } else { 1 };
+        let mut tried = 1;
+        loop {
+            match Self::start_on(free_address(listen)?, image, flash_file) {
+                Err(QemuError::Ended { .. }) if tried < tries => tried += 1,
+                outcome => return outcome,
+            }
+        }
+    }
+
+    /// Where its UART can be reached.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Waits until QEMU ends.
+    ///
+    /// # Errors
+    /// [`QemuError::Io`] if it cannot be waited for.
+    pub fn wait(mut self) -> Result<ExitStatus, QemuError> {
+        // `Child::wait` would close the pipe, which would end QEMU at once.
+        let pipe = self.child.stdin.take();
+        let status = self.child.wait().map_err(|source| QemuError::Io {
+            what: "waiting for QEMU".into(),
+            source,
+        });
+        drop(pipe);
+        status
+    }
+
+    fn start_on(
+        address: SocketAddr,
+        image: &Path,
+        flash_file: Option<&Path>,
+    ) -> Result<Self, QemuError> {
+        let mut command = qemu_command(image, flash_file)?;
+        command.args(["-monitor", "none"]);
+        command.args([
+            "-serial",
+            &format!("tcp:{address},server=on,wait=off,nodelay=on"),
+        ]);
+        let child = command
+            .stdin(Stdio::piped())
+            .stdout(std::io::stderr())
+            .spawn()
+            .map_err(|source| QemuError::Io {
+                what: "starting QEMU through sh".into(),
+                source,
+            })?;
+        let mut device = Self { child, address };
+        device.wait_until_it_answers()?;
+        Ok(device)
+    }
+
+    fn wait_until_it_answers(&mut self) -> Result<(), QemuError> {
+        let deadline = Instant::now() + START_LIMIT;
+        loop {
+            let remaining = deadline
+                .saturating_duration_since(Instant::now())
+                .max(Duration::from_millis(1));
+            match DeviceClient::connect_within(&format!("tcp:{}", self.address), remaining) {
+                Ok(_) => return Ok(()),
+                Err(error) if Instant::now() >= deadline => return Err(QemuError::Silent(error)),
+                Err(_) => {}
+            }
+            if let Ok(Some(status)) = self.child.try_wait() {
+                return Err(QemuError::Ended { status });
+            }
+            thread::sleep(Duration::from_millis(20));
+        }
+    }
+}
+
+impl Drop for QemuDevice {
+    fn drop(&mut self) {
+        // The pipe first: its end is what ends QEMU. Then the shell, so that no zombie stays.
+        drop(self.child.stdin.take());
+        let _ = self.child.wait();
+    }
+}
+
+/// Builds the image of this name if it is missing or stale, and returns where it is.
+///
+/// # Errors
+/// [`QemuError`]; what to install if there is no toolchain is said on standard error.
+pub fn build_image(image: &str) -> Result<PathBuf, QemuError> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .unwrap_or(Path::new("."));
+    let script = root.join("scripts/embedded-cargo.sh");
+    if !script.is_file() {
+        return Err(QemuError::NoSources {
+            path: root.join("firmware-sim/cortex-m"),
+        });
+    }
+    let status = Command::new(&script)
+        .args(["build", "--quiet", "--locked", "--release", "--bin", image])
+        .stdin(Stdio::null())
+        .stdout(std::io::stderr())
+        .status()
+        .map_err(|source| QemuError::Io {
+            what: script.display().to_string(),
+            source,
+        })?;
+    if !status.success() {
+        return Err(QemuError::Build {
+            image: image.to_owned(),
+            status,
+        });
+    }
+    Ok(root
+        .join("target/embedded/thumbv7em-none-eabihf/release")
+        .join(image))
+}
+
+/// Runs an image that ends by itself, such as a check, and returns what it printed over semihosting
+/// and how it ended.
+///
+/// # Errors
+/// [`QemuError`].
+pub fn run_to_end(image: &Path, flash_file: Option<&Path>) -> Result<Output, QemuError> {
+    require_qemu()?;
+    let mut child = qemu_command(image, flash_file)?
+        .args(["-monitor", "none", "-serial", "none"])
+        .args(["-semihosting-config", "enable=on,target=native"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::inherit())
+        .spawn()
+        .map_err(|source| QemuError::Io {
+            what: "starting QEMU through sh".into(),
+            source,
+        })?;
+    // Held open until QEMU has ended: `wait_with_output` would close it at once.
+    let pipe = child.stdin.take();
+    let output = child.wait_with_output();
+    drop(pipe);
+    output.map_err(|source| QemuError::Io {
+        what: "waiting for QEMU".into(),
+        source,
+    })
+}
+
+/// QEMU on this board with this image, set to end with its parent; the caller adds serial line and
+/// monitor.
+fn qemu_command(image: &Path, flash_file: Option<&Path>) -> Result<Command, QemuError> {
+    let mut command = Command::new("sh");
+    command.args([
+        "-c",
+        ENDS_WITH_PARENT,
+        "sh",
+        "qemu-system-arm",
+        "-machine",
+        "mps2-an386",
+        "-cpu",
+        "cortex-m4",
+    ]);
+    command.args(["-display", "none"]).arg("-kernel").arg(image);
+    if let Some(path) = flash_file {
+        let unreadable = |source| QemuError::Io {
+            what: format!("the flash file {}", path.display()),
+            source,
+        };
+        // Opened as well as measured, so that one that cannot be read is found out here and not by
+        // QEMU.
+        let length = std::fs::File::open(path)
+            .and_then(|file| file.metadata())
+            .map_err(unreadable)?
+            .len();
+        if length > FLASH_LENGTH as u64 {
+            return Err(QemuError::FlashTooLong {
+                path: path.to_owned(),
+                length,
+            });
+        }
+        if length > 0 {
+            // In QEMU's options a comma ends a value unless it is doubled.
+            let file = path.display().to_string().replace(',', ",,");
+            command.args([
+                "-device",
+                &format!("loader,file={file},addr={FLASH_START:#x},force-raw=on"),
+            ]);
+        }
+    }
+    Ok(command)
+}
+
+/// Makes sure that QEMU is installed.
+///
+/// # Errors
+/// [`QemuError::NotInstalled`], with the remedy in its text.
+pub fn require_qemu() -> Result<(), QemuError> {
+    let version = Command::new("qemu-system-arm")
+        .arg("--version")
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status();
+    match version {
+        Ok(_) => Ok(()),
+        Err(error) if error.kind() == ErrorKind::NotFound => Err(QemuError::NotInstalled),
+        Err(source) => Err(QemuError::Io {
+            what: "qemu-system-arm --version".into(),
+            source,
+        }),
+    }
+}
+
+/// `listen` with a free port in place of 0, after a look whether it can be had at all.
+fn free_address(listen: SocketAddr) -> Result<SocketAddr, QemuError> {
+    let listener = TcpListener::bind(listen).map_err(|source| QemuError::Listen {
+        address: listen,
+        source,
+    })?;
+    listener.local_addr().map_err(|source| QemuError::Listen {
+        address: listen,
+        source,
+    })
+}
