@@ -1,6 +1,7 @@
 //! Camera calibration with one ray per pixel, from a chessboard on a rotation stage.
 
 pub mod board;
+pub mod cli;
 pub mod dataset;
 pub mod detect;
 pub mod field;

@@ -197,12 +197,7 @@ fn plus(node: Node, step: Node, times: i32) -> Node {
 fn extent_of<'a>(nodes: impl Iterator<Item = &'a Node>) -> (Node, Node) {
     nodes.fold(
         ((i32::MAX, i32::MAX), (i32::MIN, i32::MIN)),
-        |(low, high), &(i, j)| {
-            (
-                (low.0.min(i), low.1.min(j)),
-                (high.0.max(i), high.1.max(j)),
-            )
-        },
+        |(low, high), &(i, j)| ((low.0.min(i), low.1.min(j)), (high.0.max(i), high.1.max(j))),
     )
 }
 
@@ -214,8 +209,7 @@ fn fits_board(nodes: &[Node], board: &BoardSpec) -> bool {
 }
 
 fn right_handed(raw: &[RawCorner]) -> BTreeMap<Node, PixelPoint> {
-    let as_found: BTreeMap<Node, PixelPoint> =
-        raw.iter().map(|c| ((c.i, c.j), c.pixel)).collect();
+    let as_found: BTreeMap<Node, PixelPoint> = raw.iter().map(|c| ((c.i, c.j), c.pixel)).collect();
     let turning: f64 = as_found
         .keys()
         .filter_map(|&node| px_from_square(&as_found, node))
@@ -245,9 +239,8 @@ fn without_strays(
         let (w, h) = (w as i32, h as i32);
         for i0 in low.0..=(high.0 - w + 1).max(low.0) {
             for j0 in low.1..=(high.1 - h + 1).max(low.1) {
-                let within = |&&(i, j): &&Node| {
-                    (i0..i0 + w).contains(&i) && (j0..j0 + h).contains(&j)
-                };
+                let within =
+                    |&&(i, j): &&Node| (i0..i0 + w).contains(&i) && (j0..j0 + h).contains(&j);
                 let kept: Vec<Node> = nodes.iter().filter(within).copied().collect();
                 if kept.len() > best.len() {
                     best = kept;
