@@ -8,3 +8,4 @@ pub mod field;
 pub mod geometry;
 pub mod progress;
 pub mod report;
+pub mod simulate;

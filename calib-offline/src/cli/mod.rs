@@ -1,3 +1,4 @@
-//! The command line.
+//! The command line: one file per subcommand.
 
 pub mod detect;
+pub mod simulate;
