@@ -251,8 +251,9 @@ mod tests {
 
     #[test]
     fn values_between_pixels_are_bilinear_and_end_at_the_outer_centers() {
-        let image = GrayImage::from_values(SensorSize::new(2, 2), vec![0.0, 10.0, 20.0, 30.0], 255.0)
-            .unwrap();
+        let image =
+            GrayImage::from_values(SensorSize::new(2, 2), vec![0.0, 10.0, 20.0, 30.0], 255.0)
+                .unwrap();
         assert_eq!(image.between(0.25, 0.5), Some(12.5));
         assert_eq!(image.between(1.0, 1.0), Some(30.0));
         assert_eq!(image.between(1.01, 0.0), None);

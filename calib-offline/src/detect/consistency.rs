@@ -81,6 +81,9 @@ const CLEAR_MARGIN_RAD: f64 = 30.0 * TAU / 360.0;
 const EPIPOLAR_FACTOR: f64 = 3.0;
 /// ... the best stays within this part of a square.
 const EPIPOLAR_SQUARES: f64 = 0.25;
+/// ... and the second best exceeds what corner noise alone can do (boards that turn about a fixed
+/// middle, far away, nearly fit after a half turn too).
+const EPIPOLAR_FLOOR_PX: f64 = 0.5;
 /// Epipolar geometry needs boards in at least this many planes.
 const EPIPOLAR_POSES: usize = 2;
 /// A part of a board is placed by a score (distance in squares) if the best is below this, ...
@@ -109,7 +112,12 @@ pub fn settle(
         chosen: vec![None; views.len()],
         views,
     };
-    let camera_count = work.views.iter().map(|v| v.camera_idx + 1).max().unwrap_or(0);
+    let camera_count = work
+        .views
+        .iter()
+        .map(|v| v.camera_idx + 1)
+        .max()
+        .unwrap_or(0);
     for camera_idx in 0..camera_count {
         match work.best_reference(camera_idx) {
             Some(reference) => work.follow_camera(camera_idx, reference)?,
@@ -158,8 +166,7 @@ impl Settling<'_> {
         let mut found: Vec<usize> = (0..self.views.len())
             .filter(|&k| {
                 let view = &self.views[k];
-                let mut turns: Vec<u8> =
-                    view.placements.iter().map(|p| p.quarter_turns).collect();
+                let mut turns: Vec<u8> = view.placements.iter().map(|p| p.quarter_turns).collect();
                 turns.sort_unstable();
                 turns.dedup();
                 let distinct = turns.len() == view.placements.len();
@@ -212,11 +219,7 @@ impl Settling<'_> {
     /// Settles a view by the nearest settled pose of its camera. Free poses that are turned too
     /// far, and the first pose, get the numbering nearest to `upright_rad`: the label of a free
     /// pose matters only between cameras.
-    fn follow_nearest_pose(
-        &mut self,
-        k: usize,
-        upright_rad: f64,
-    ) -> Result<(), ConsistencyError> {
+    fn follow_nearest_pose(&mut self, k: usize, upright_rad: f64) -> Result<(), ConsistencyError> {
         let (camera_idx, pose) = (self.views[k].camera_idx, self.views[k].pose);
         let neighbor = self.nearest_settled(camera_idx, pose);
         let reference = neighbor.and_then(|n| self.chosen_angle(n));
@@ -340,9 +343,9 @@ impl Settling<'_> {
         }
         scored.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (best, second) = (scored.first()?, scored.get(1)?);
-        let clear = best.0 <= EPIPOLAR_SQUARES * square_px && second.0 >= EPIPOLAR_FACTOR * best.0;
-        // Round-off decides nothing: boards in one plane fit any turn.
-        (clear && second.0 > 0.02 * square_px).then_some(best.1)
+        let clear = best.0 <= EPIPOLAR_SQUARES * square_px
+            && second.0 >= (EPIPOLAR_FACTOR * best.0).max(EPIPOLAR_FLOOR_PX);
+        clear.then_some(best.1)
     }
 
     /// Corners that a settled view and a view under a placement have in common.
@@ -436,7 +439,13 @@ impl Settling<'_> {
     /// if no other camera can tell.
     fn epipolar_scores(&self, k: usize, candidates: &[Placement]) -> Vec<(f64, Placement)> {
         let view = &self.views[k];
-        for other_camera in 0..self.views.iter().map(|v| v.camera_idx + 1).max().unwrap_or(0) {
+        for other_camera in 0..self
+            .views
+            .iter()
+            .map(|v| v.camera_idx + 1)
+            .max()
+            .unwrap_or(0)
+        {
             let Some(other) = self.view_at(other_camera, view.pose) else {
                 continue;
             };

@@ -1,8 +1,10 @@
 //! Whether corners of two cameras can belong together: the fundamental matrix as a check.
 //!
 //! Two cameras that keep their places see every point of every pose under one fundamental matrix.
-//! Labels that are turned in one camera break this as soon as poses are tilted differently, by
-//! much more than lens distortion does. Used to decide and to warn, never to estimate.
+//! Labels that are turned in one camera break this if the poses are tilted differently and lie in
+//! different places: by pixels, where lens distortion leaves less. Boards that turn about a fixed
+//! middle far away nearly fit after a half turn too (0.2 px for 110 mm at 300 mm). Used to decide
+//! and to warn, never to estimate.
 
 use crate::geometry::PixelPoint;
 use nalgebra::{Matrix3, SMatrix, SVector, SymmetricEigen, Vector3};
@@ -66,7 +68,9 @@ fn homogeneous(pixel: PixelPoint) -> Vector3<f64> {
 /// Moves the mean to the origin and scales the RMS distance from it to the square root of two.
 fn normalization(pixels: impl Iterator<Item = PixelPoint> + Clone) -> Option<Matrix3<f64>> {
     let count = pixels.clone().count() as f64;
-    let sum = pixels.clone().fold((0.0, 0.0), |s, p| (s.0 + p.u, s.1 + p.v));
+    let sum = pixels
+        .clone()
+        .fold((0.0, 0.0), |s, p| (s.0 + p.u, s.1 + p.v));
     let mean = PixelPoint::new(sum.0 / count, sum.1 / count);
     let spread: f64 = pixels.map(|p| p.distance_px(mean).powi(2)).sum();
     let scale = (2.0 * count / spread).sqrt();
@@ -100,10 +104,15 @@ mod tests {
                 let seen = |r: i32, c: i32, baseline_mm: f64| {
                     let on_board =
                         Vector3::new(f64::from(c) * 25.0 - 100.0, f64::from(r) * 25.0 - 62.0, 0.0);
-                    let p = rotation * on_board + Vector3::new(-baseline_mm, 0.0, 300.0);
+                    let p = rotation * on_board
+                        + Vector3::new(60.0 * tilt - baseline_mm, 0.0, 300.0 + 80.0 * tilt);
                     PixelPoint::new(320.0 + 530.0 * p.x / p.z, 240.0 + 530.0 * p.y / p.z)
                 };
-                let (r2, c2) = if half_turned_in_second { (5 - r, 8 - c) } else { (r, c) };
+                let (r2, c2) = if half_turned_in_second {
+                    (5 - r, 8 - c)
+                } else {
+                    (r, c)
+                };
                 all.push((seen(r, c, 0.0), seen(r2, c2, 83.0)));
             }
         }
@@ -117,7 +126,8 @@ mod tests {
         assert!(f.median_distance_px(&straight).unwrap() < 1e-6);
         let turned = matches(true);
         let f = FundamentalMatrix::from_matches(&turned).unwrap();
-        assert!(f.median_distance_px(&turned).unwrap() > 3.0);
+        let median_px = f.median_distance_px(&turned).unwrap();
+        assert!(median_px > 1.0, "{median_px}");
     }
 
     #[test]

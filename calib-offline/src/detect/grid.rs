@@ -6,7 +6,7 @@ use crate::board::BoardSpec;
 use crate::dataset::image::GrayImage;
 use crate::geometry::PixelPoint;
 use nalgebra::{Matrix2, Vector2};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Position in a grid, counted along its two directions.
 pub type Node = (i32, i32);
@@ -29,6 +29,8 @@ const MAX_MOVE_SQUARES: f64 = 0.15;
 const MAX_MOVE_PX: f64 = 1.5;
 /// An undetected corner must lie this near to where its neighbors predict it, squares.
 const MAX_MISS_SQUARES: f64 = 0.12;
+/// So far an image must reach into the squares around an undetected corner, squares.
+const REACH_SQUARES: f64 = 0.2;
 /// Contrast of a corner against the median of the image: less is a shadow, or no corner.
 const MIN_AMPLITUDE_OF_MEDIAN: f64 = 0.3;
 /// RMS residual against amplitude. A T-junction, where the board ends, has about 0.5.
@@ -132,10 +134,15 @@ impl FittedGrid {
     /// Fits the corners that the neighbors predict and the detector missed, as far as the board
     /// reaches, until no more are found.
     fn complete(&mut self, image: &GrayImage, board: &BoardSpec, max_half_window_px: f64) {
+        let mut tried = BTreeSet::new();
         loop {
             let pixels = self.pixels();
             let mut added = false;
             for node in missing_neighbors(&pixels, board) {
+                // Once more with more neighbors would be the same window again.
+                if !tried.insert(node) {
+                    continue;
+                }
                 let Some(corner) = self.fit_missing(image, &pixels, node, max_half_window_px)
                 else {
                     continue;
@@ -166,12 +173,33 @@ impl FittedGrid {
             pixel,
             px_from_square,
         };
+        if !shows_four_squares(image, &guess) {
+            return None;
+        }
         let corner = fit_corner(image, &guess, max_half_window_px)?;
         let near = corner.moved_px <= MAX_MISS_SQUARES * shorter_side(&px_from_square);
         let as_sharp = corner.blur_px <= 2.0 * typical.blur_px + 0.5;
         let genuine = is_board_corner(node, &corner, self.dark_before_origin, typical.amplitude);
         (near && as_sharp && genuine).then_some(corner)
     }
+}
+
+/// Whether the image reaches into all four squares around a corner. At its edge the end of the
+/// board's last squares looks like a corner of which half is cut off.
+fn shows_four_squares(image: &GrayImage, guess: &CornerGuess) -> bool {
+    let reach = REACH_SQUARES;
+    [
+        (-reach, -reach),
+        (reach, -reach),
+        (-reach, reach),
+        (reach, reach),
+    ]
+    .iter()
+    .all(|&(x, y)| {
+        let offset = guess.px_from_square * Vector2::new(x, y);
+        let (u, v) = (guess.pixel.u + offset.x, guess.pixel.v + offset.y);
+        image.between(u, v).is_some()
+    })
 }
 
 /// Medians over the corners of an image.
@@ -197,12 +225,7 @@ fn plus(node: Node, step: Node, times: i32) -> Node {
 fn extent_of<'a>(nodes: impl Iterator<Item = &'a Node>) -> (Node, Node) {
     nodes.fold(
         ((i32::MAX, i32::MAX), (i32::MIN, i32::MIN)),
-        |(low, high), &(i, j)| {
-            (
-                (low.0.min(i), low.1.min(j)),
-                (high.0.max(i), high.1.max(j)),
-            )
-        },
+        |(low, high), &(i, j)| ((low.0.min(i), low.1.min(j)), (high.0.max(i), high.1.max(j))),
     )
 }
 
@@ -214,8 +237,7 @@ fn fits_board(nodes: &[Node], board: &BoardSpec) -> bool {
 }
 
 fn right_handed(raw: &[RawCorner]) -> BTreeMap<Node, PixelPoint> {
-    let as_found: BTreeMap<Node, PixelPoint> =
-        raw.iter().map(|c| ((c.i, c.j), c.pixel)).collect();
+    let as_found: BTreeMap<Node, PixelPoint> = raw.iter().map(|c| ((c.i, c.j), c.pixel)).collect();
     let turning: f64 = as_found
         .keys()
         .filter_map(|&node| px_from_square(&as_found, node))
@@ -245,9 +267,8 @@ fn without_strays(
         let (w, h) = (w as i32, h as i32);
         for i0 in low.0..=(high.0 - w + 1).max(low.0) {
             for j0 in low.1..=(high.1 - h + 1).max(low.1) {
-                let within = |&&(i, j): &&Node| {
-                    (i0..i0 + w).contains(&i) && (j0..j0 + h).contains(&j)
-                };
+                let within =
+                    |&&(i, j): &&Node| (i0..i0 + w).contains(&i) && (j0..j0 + h).contains(&j);
                 let kept: Vec<Node> = nodes.iter().filter(within).copied().collect();
                 if kept.len() > best.len() {
                     best = kept;

@@ -21,10 +21,7 @@ impl Placement {
     /// placement was made for.
     pub fn row_col(&self, node: Node) -> (usize, usize) {
         let (x, y) = turned(node, self.quarter_turns);
-        (
-            (y + self.row_shift) as usize,
-            (x + self.col_shift) as usize,
-        )
+        ((y + self.row_shift) as usize, (x + self.col_shift) as usize)
     }
 
     /// Whether the square before corner (0, 0) of the board, towards negative x and y, is dark.
@@ -94,7 +91,7 @@ pub fn symmetry_order(board: &BoardSpec) -> usize {
 /// odd with as many rows as columns): the same corner is then the first one in every image of every
 /// camera, today and tomorrow. `None` where the printed board alone decides.
 pub fn fixed_color(board: &BoardSpec) -> Option<bool> {
-    let turn_changes_it = !board.looks_same_after_half_turn()
-        || (board.rows == board.cols && board.rows % 2 == 1);
+    let turn_changes_it =
+        !board.looks_same_after_half_turn() || (board.rows == board.cols && board.rows % 2 == 1);
     turn_changes_it.then_some(true)
 }

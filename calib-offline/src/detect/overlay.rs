@@ -1,10 +1,13 @@
 //! The image with what was found in it drawn over: for people to check the labels.
 
+use super::Detection;
 use super::verdict::{ImageVerdict, Outcome};
-use crate::dataset::View;
 use crate::dataset::image::GrayImage;
+use crate::dataset::{Dataset, View};
+use crate::progress::Progress;
 use image::{Rgb, RgbImage};
-use std::path::Path;
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
 
 const FIRST: Rgb<u8> = Rgb([255, 60, 60]);
 const ROW_ZERO: Rgb<u8> = Rgb([255, 160, 0]);
@@ -62,17 +65,60 @@ pub fn draw(image: &GrayImage, view: Option<&View>, verdict: &ImageVerdict) -> R
     canvas
 }
 
-/// Draws the overlay and writes it as PNG.
+/// Why overlays could not be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum OverlayError {
+    /// The folder cannot be made.
+    #[error("cannot make the folder {folder} for overlays: {source}")]
+    Folder {
+        /// The folder.
+        folder: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A file cannot be written.
+    #[error("cannot write the overlay {path}: {source}")]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the encoder or the system said.
+        source: image::ImageError,
+    },
+}
+
+/// Writes the overlay of every image that can be read to `CAMERA_POSE.png` in the folder, which is
+/// made if need be. Files of these names are replaced.
 ///
 /// # Errors
-/// What the encoder or the file system says.
-pub fn write(
-    path: &Path,
-    image: &GrayImage,
-    view: Option<&View>,
-    verdict: &ImageVerdict,
-) -> Result<(), image::ImageError> {
-    draw(image, view, verdict).save_with_format(path, image::ImageFormat::Png)
+/// [`OverlayError`].
+pub fn write_all(
+    folder: &Path,
+    dataset: &Dataset,
+    detection: &Detection,
+    progress: &dyn Progress,
+) -> Result<(), OverlayError> {
+    std::fs::create_dir_all(folder).map_err(|source| OverlayError::Folder {
+        folder: folder.to_path_buf(),
+        source,
+    })?;
+    progress.begin("drawing overlays", detection.images.len());
+    let written = detection.images.par_iter().try_for_each(|verdict| {
+        let camera = dataset.cameras.get(verdict.camera_idx);
+        // An unreadable image has its verdict; there is nothing to draw on.
+        if let (Some(camera), Ok(image)) = (camera, GrayImage::load(&verdict.path)) {
+            let of_image = |v: &&View| (v.camera_idx, v.pose) == (verdict.camera_idx, verdict.pose);
+            let view = detection.views.iter().find(of_image);
+            let path = folder.join(format!("{}_{:03}.png", camera.name, verdict.pose));
+            draw(&image, view, verdict)
+                .save_with_format(&path, image::ImageFormat::Png)
+                .map_err(|source| OverlayError::Write { path, source })?;
+        }
+        progress.advance();
+        Ok(())
+    });
+    progress.end();
+    written
 }
 
 fn enlarged(image: &GrayImage, scale: u32) -> RgbImage {
@@ -94,7 +140,11 @@ fn put(canvas: &mut RgbImage, u: i64, v: i64, color: Rgb<u8>) {
 }
 
 fn line(canvas: &mut RgbImage, from: (f64, f64), to: (f64, f64), color: Rgb<u8>) {
-    let steps = (to.0 - from.0).abs().max((to.1 - from.1).abs()).ceil().max(1.0);
+    let steps = (to.0 - from.0)
+        .abs()
+        .max((to.1 - from.1).abs())
+        .ceil()
+        .max(1.0);
     for k in 0..=steps as i64 {
         let t = k as f64 / steps;
         let (u, v) = (from.0 + t * (to.0 - from.0), from.1 + t * (to.1 - from.1));

@@ -54,13 +54,13 @@ pub enum Refusal {
         /// Difference of the 99.5 % and the 0.5 % quantile, percent of the white level.
         contrast_percent: f64,
     },
-    /// No board, and no sharp edge either.
+    /// The board's edges, or the steepest of the image if there is no board, are too wide.
     #[error(
-        "blurred: no board found, and the sharpest edges are about {edge_px:.0} px wide; focus the \
-         lens, and let the board stand still"
+        "blurred: the edges are about {edge_px:.0} px wide; focus the lens, and let the board stand \
+         still"
     )]
     Blurred {
-        /// Width of the steepest edges from 10 % to 90 %, px.
+        /// Width of the edges from 10 % to 90 %, px.
         edge_px: f64,
     },
     /// No grid of corners.
@@ -101,6 +101,15 @@ pub enum Refusal {
          and is the image mirrored or inverted?"
     )]
     WrongColors,
+}
+
+impl Refusal {
+    /// The board is there, but blurred by a standard deviation of so many pixels.
+    pub fn too_blurred(blur_px: f64) -> Self {
+        Self::Blurred {
+            edge_px: EDGE_WIDTH_OF_BLUR * blur_px,
+        }
+    }
 }
 
 /// What to do about a board of another size; sizes are (rows, cols).
@@ -145,6 +154,8 @@ pub struct ImageFigures {
 const EDGE_WIDTH_OF_BLUR: f64 = 2.563;
 /// Less contrast than this part of the range is refused: with 8 bits, 10 code values.
 const MIN_CONTRAST_PERCENT: f64 = 4.0;
+/// Squares blurred by more than this part of their side run into each other.
+pub const MAX_BLUR_SQUARES: f64 = 0.25;
 /// Without a board, edges at least this wide are called blurred, px.
 const BLURRED_EDGE_PX: f64 = 8.0;
 
@@ -179,9 +190,8 @@ pub fn why_nothing_found(image: &GrayImage) -> Refusal {
     let steepest = steepest_slope(image);
     // A step blurred by a Gaussian has the slope contrast / (sigma sqrt(2 pi)).
     let blur_px = contrast / (steepest * std::f64::consts::TAU.sqrt());
-    let edge_px = EDGE_WIDTH_OF_BLUR * blur_px;
-    if edge_px > BLURRED_EDGE_PX {
-        return Refusal::Blurred { edge_px };
+    if EDGE_WIDTH_OF_BLUR * blur_px > BLURRED_EDGE_PX {
+        return Refusal::too_blurred(blur_px);
     }
     Refusal::NoBoard
 }
@@ -199,7 +209,10 @@ pub fn why_not_placed(grid: &FittedGrid, board: &BoardSpec) -> Refusal {
 
 /// The slope that 0.5 % of the pixels exceed, code values per pixel (central differences).
 fn steepest_slope(image: &GrayImage) -> f64 {
-    let (width, height) = (i64::from(image.sensor.width), i64::from(image.sensor.height));
+    let (width, height) = (
+        i64::from(image.sensor.width),
+        i64::from(image.sensor.height),
+    );
     let mut slopes = Vec::new();
     for v in 1..height - 1 {
         for u in 1..width - 1 {
