@@ -59,8 +59,15 @@ pub struct CommonArgs {
     /// Say more; twice says most
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
-    /// Color the words that matter; NO_COLOR in the environment is respected
-    #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
+    /// When to color the words that matter.
+    #[arg(
+        long,
+        global = true,
+        value_name = "WHEN",
+        default_value = "auto",
+        hide_possible_values = true,
+        help = "Color the words that matter: auto (on a terminal, unless NO_COLOR is set), always, never"
+    )]
     pub color: ColorChoice,
     /// Use so many threads [default: all]; results do not depend on it
     #[arg(long, global = true, value_name = "COUNT")]

@@ -112,15 +112,7 @@ pub fn calibration() -> Calibration {
         poses,
         corners,
         left_out: left_out(),
-        held_out: Some(HeldOutRecord {
-            folds: 5,
-            rms_px: Some(0.0741),
-            median_px: Some(0.0602),
-            neighbor_rms_percent: Some(0.152),
-            rigid_rms_mm: Some(0.0113),
-            point_count: 5872,
-            outside_count: 41,
-        }),
+        held_out: Some(held_out()),
         verdict: Verdict {
             grade: Grade::Doubtful,
             reasons: vec![
@@ -128,6 +120,18 @@ pub fn calibration() -> Calibration {
                 "right: 79 % of the sensor is calibrated (limit 85 %)".to_owned(),
             ],
         },
+    }
+}
+
+fn held_out() -> HeldOutRecord {
+    HeldOutRecord {
+        folds: 5,
+        rms_px: Some(0.0741),
+        median_px: Some(0.0602),
+        neighbor_rms_percent: Some(0.152),
+        rigid_rms_mm: Some(0.0113),
+        point_count: 5872,
+        outside_count: 41,
     }
 }
 
