@@ -1,5 +1,7 @@
 //! What the tests that drive the real binary share: running it, and inputs for it.
 
+#![allow(dead_code, reason = "each test file uses its part")]
+
 use calib_offline::board::BoardSpec;
 use calib_offline::field::{BaseLens, CalibratedCamera, CoverageMask, Projection, RayField, Rig};
 use calib_offline::geometry::{PixelPoint, RigidTransform, SensorSize, so3};
