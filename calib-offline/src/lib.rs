@@ -13,3 +13,4 @@ pub mod pack;
 pub mod pipeline;
 pub mod progress;
 pub mod report;
+pub mod simulate;

@@ -15,6 +15,7 @@ pub mod place;
 pub mod progress;
 mod rig_file;
 pub mod settings;
+pub mod simulate;
 
 use crate::error::Error;
 use args::{Cli, Verb};
