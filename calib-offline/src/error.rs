@@ -2,9 +2,12 @@
 
 use crate::atomic_file::WriteError;
 use crate::dataset::{CornersError, ManifestError, SufficiencyError};
+use crate::detect::DetectError;
+use crate::detect::overlay::OverlayError;
 use crate::matches::MatchesError;
 use crate::pack::PackError;
 use crate::report::store::CalibrationError;
+use crate::simulate::SimulateError;
 use std::path::PathBuf;
 
 /// Why a command did not do what it was asked for.
@@ -17,6 +20,15 @@ pub enum Error {
     /// The corners of a dataset.
     #[error("the corners of the dataset cannot be used")]
     Corners(#[from] CornersError),
+    /// The search for corners in the images.
+    #[error("the corners cannot be found")]
+    Detect(#[from] DetectError),
+    /// Pictures of the corners found.
+    #[error("the overlays cannot be written")]
+    Overlay(#[from] OverlayError),
+    /// A dataset that was to be simulated.
+    #[error("the dataset cannot be simulated")]
+    Simulate(#[from] SimulateError),
     /// Corners that no estimate could work with.
     #[error("these corners cannot determine a calibration")]
     Sufficiency(#[from] SufficiencyError),
@@ -164,9 +176,14 @@ impl Error {
     /// The process's exit code: 3 where the data cannot determine the answer, else 2.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Sufficiency(_) | Self::Pack(PackError::NothingCalibrated { .. }) => 3,
+            Self::Sufficiency(_)
+            | Self::Detect(DetectError::Consistency(_))
+            | Self::Pack(PackError::NothingCalibrated { .. }) => 3,
             Self::Manifest(_)
             | Self::Corners(_)
+            | Self::Detect(_)
+            | Self::Overlay(_)
+            | Self::Simulate(_)
             | Self::Calibration(_)
             | Self::Blob(_)
             | Self::Matches(_)
@@ -183,6 +200,13 @@ impl Error {
             Self::Manifest(error) => error.remedy(),
             Self::Corners(error) => error.remedy(),
             Self::Sufficiency(error) => error.remedy(),
+            Self::Detect(DetectError::NoImages) => None,
+            Self::Detect(_) => Some(
+                "look at the images with --overlay DIR; a board with an odd and an even number of corners cannot be turned unnoticed"
+                    .to_owned(),
+            ),
+            Self::Overlay(_) => Some("choose another folder for --overlay".to_owned()),
+            Self::Simulate(_) => Some("see calib-offline simulate --help".to_owned()),
             Self::Calibration(error) => error.remedy(),
             Self::Blob(error) => error.remedy(),
             Self::Matches(error) => error.remedy(),

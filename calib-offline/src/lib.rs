@@ -4,6 +4,7 @@ pub mod atomic_file;
 pub mod board;
 pub mod cli;
 pub mod dataset;
+pub mod detect;
 pub mod error;
 pub mod evaluate;
 pub mod field;

@@ -76,7 +76,15 @@ fn every_help_starts_with_an_example() {
     for part in ["  0  done", "  1  done, but", "  2  usage", "  3  the data"] {
         assert!(top.stdout.contains(part), "{part}");
     }
-    for verb in ["calibrate", "demo", "inspect", "measure", "pack"] {
+    for verb in [
+        "calibrate",
+        "demo",
+        "detect",
+        "inspect",
+        "measure",
+        "pack",
+        "simulate",
+    ] {
         for arguments in [[verb, "--help"], ["help", verb], [verb, "-h"]] {
             let help = run(folder.path(), &arguments);
             help.assert_code(0);

@@ -1,13 +1,18 @@
 //! What can be written on the command line. Each help text starts with an example.
 
-use super::{calibrate, demo, inspect, measure, pack};
+use super::{calibrate, demo, detect, inspect, measure, pack, simulate};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::num::NonZeroUsize;
 
 const EXAMPLE: &str = "\
 Example:
+  calib-offline detect recordings/monday
   calib-offline calibrate recordings/monday -o results/monday
   calib-offline measure results/monday/rig.rays matches.csv -o points.csv";
+
+const SIMULATE_EXAMPLE: &str = "\
+Example:
+  calib-offline simulate -o port --optics port --seed 7";
 
 const EXIT_CODES: &str = "\
 Exit codes:
@@ -39,12 +44,17 @@ pub enum Verb {
     Calibrate(calibrate::CalibrateArgs),
     /// Run the whole chain on the data that comes with the program
     Demo(demo::DemoArgs),
+    /// Find the board's corners in a dataset's images: corners.csv
+    Detect(detect::DetectArgs),
     /// Say what a dataset, a calibration or a blob is
     Inspect(inspect::InspectArgs),
     /// Triangulate matches
     Measure(measure::MeasureArgs),
     /// Pack a calibration for the device within a proven error
     Pack(pack::PackArgs),
+    /// Make a dataset with known truth
+    #[command(before_help = SIMULATE_EXAMPLE)]
+    Simulate(simulate::SimulateArgs),
 }
 
 /// What holds for every verb.

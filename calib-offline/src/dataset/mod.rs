@@ -2,7 +2,8 @@
 
 pub mod corners;
 pub mod identity;
-pub mod images;
+pub mod image;
+pub mod image_files;
 pub mod manifest;
 pub mod split;
 pub mod stage;

@@ -1,0 +1,319 @@
+//! `detect`: from a dataset's images to labelled corners, with a verdict on every image.
+
+use crate::dataset::{Dataset, View};
+use crate::detect::overlay::{OverlayError, write_all};
+use crate::detect::verdict::{ImageFigures, ImageVerdict, Outcome};
+use crate::detect::{
+    DetectError, DetectSettings, Detection, PairCheck, TurnedImage, detect_dataset,
+};
+use crate::progress::Progress;
+use clap::Args;
+use serde::Serialize;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+const EXAMPLE: &str = "\
+Example:
+  calib-offline detect recordings/monday --overlay /tmp/monday
+  calib-offline calibrate recordings/monday -o results/monday";
+
+const FORMATS: &str = "\
+Finds the board of dataset.toml in every image that is not excluded and writes
+DATASET/corners.csv (camera,pose,row,col,u,v,sigma_px). Every image gets a verdict; a refused one
+says why. The same corner has the same label in every image of every camera; what cannot be
+decided is an error. The overlay shows row 0 in orange and corner (0, 0) in a red square.
+
+With --json: schema calib-offline/detect/1, images (camera, pose, file, verdict, corner_count,
+partial, quarter_turns, reason, figures), turned, pair_checks, used, corner_count.";
+
+/// The arguments.
+#[derive(Debug, Args)]
+#[command(before_help = EXAMPLE, after_help = FORMATS)]
+pub struct DetectArgs {
+    /// The folder with dataset.toml
+    #[arg(value_name = "DATASET")]
+    pub dataset: PathBuf,
+    /// Write each image with its corners drawn in, as PNG, to this folder
+    #[arg(long, value_name = "DIR")]
+    pub overlay: Option<PathBuf>,
+    /// Replace corners.csv if it exists
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Why the command failed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DetectCommandError {
+    /// The images as a whole. Exit code 2 without images, else 3.
+    #[error(transparent)]
+    Detect(#[from] DetectError),
+    /// An overlay could not be written. Exit code 2.
+    #[error(transparent)]
+    Overlay(#[from] OverlayError),
+}
+
+/// What the command found.
+#[derive(Debug)]
+pub struct DetectReport {
+    /// The corners to write to `corners.csv`; none if no image could be used: exit code 3.
+    pub views: Vec<View>,
+    /// What `--json` prints.
+    pub object: DetectObject,
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+pub struct DetectObject {
+    schema: &'static str,
+    images: Vec<ImageObject>,
+    turned: Vec<TurnedObject>,
+    pair_checks: Vec<PairObject>,
+    /// Images with corners.
+    pub used: usize,
+    /// Corners in all of them.
+    pub corner_count: usize,
+}
+
+#[derive(Debug, Serialize)]
+struct ImageObject {
+    camera: String,
+    pose: usize,
+    file: PathBuf,
+    verdict: &'static str,
+    corner_count: usize,
+    partial: bool,
+    quarter_turns: Option<u8>,
+    reason: Option<String>,
+    figures: Option<FiguresObject>,
+}
+
+#[derive(Debug, Serialize)]
+struct FiguresObject {
+    contrast_percent: f64,
+    edge_px: f64,
+    square_px: f64,
+    residual_percent: f64,
+    sigma_px: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct TurnedObject {
+    camera: String,
+    pose: usize,
+    quarter_turns: u8,
+}
+
+#[derive(Debug, Serialize)]
+struct PairObject {
+    first_camera: String,
+    second_camera: String,
+    poses: usize,
+    median_px: f64,
+    worst_pose: usize,
+    worst_px: f64,
+}
+
+/// Finds the corners and writes the overlays that are asked for; `corners.csv` is the caller's.
+///
+/// # Errors
+/// [`DetectCommandError`].
+pub fn run(
+    args: &DetectArgs,
+    dataset: &Dataset,
+    progress: &dyn Progress,
+) -> Result<DetectReport, DetectCommandError> {
+    let detection = detect_dataset(dataset, &DetectSettings::default(), progress)?;
+    if let Some(folder) = &args.overlay {
+        write_all(folder, dataset, &detection, progress)?;
+    }
+    let object = DetectObject::new(dataset, &detection);
+    Ok(DetectReport {
+        views: detection.views,
+        object,
+    })
+}
+
+impl DetectObject {
+    fn new(dataset: &Dataset, detection: &Detection) -> Self {
+        let name = |camera_idx: usize| {
+            let camera = dataset.cameras.get(camera_idx);
+            camera.map_or_else(|| camera_idx.to_string(), |c| c.name.clone())
+        };
+        let turned = |turned: &TurnedImage| TurnedObject {
+            camera: name(turned.camera_idx),
+            pose: turned.pose,
+            quarter_turns: turned.quarter_turns,
+        };
+        let pair = |check: &PairCheck| PairObject {
+            first_camera: name(0),
+            second_camera: name(check.camera_idx),
+            poses: check.pose_count,
+            median_px: check.median_px,
+            worst_pose: check.worst_pose,
+            worst_px: check.worst_px,
+        };
+        let image = |image: &ImageVerdict| ImageObject::new(image, name(image.camera_idx));
+        Self {
+            schema: "calib-offline/detect/1",
+            images: detection.images.iter().map(image).collect(),
+            turned: detection.turned.iter().map(turned).collect(),
+            pair_checks: detection.pair_checks.iter().map(pair).collect(),
+            used: detection.views.len(),
+            corner_count: detection.views.iter().map(|v| v.corners.len()).sum(),
+        }
+    }
+
+    /// The report in words: a line per image, then what stands out.
+    pub fn in_words(&self) -> String {
+        let mut text = String::new();
+        for image in &self.images {
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "{}", image.in_words());
+        }
+        for turned in &self.turned {
+            let degrees = i32::from(turned.quarter_turns) * 90;
+            let _ = writeln!(
+                text,
+                "turned: {} pose {} by {} degrees against most images",
+                turned.camera,
+                turned.pose,
+                if degrees > 180 {
+                    degrees - 360
+                } else {
+                    degrees
+                }
+            );
+        }
+        for pair in &self.pair_checks {
+            let _ = writeln!(
+                text,
+                "{} and {} agree to {:.2} px (median distance from epipolar lines, {} poses; \
+                 worst pose {}: {:.2} px)",
+                pair.first_camera,
+                pair.second_camera,
+                pair.median_px,
+                pair.poses,
+                pair.worst_pose,
+                pair.worst_px
+            );
+        }
+        let _ = write!(
+            text,
+            "{} of {} images used, {} corners",
+            self.used,
+            self.images.len(),
+            self.corner_count
+        );
+        text
+    }
+}
+
+impl ImageObject {
+    fn new(image: &ImageVerdict, camera: String) -> Self {
+        let (corner_count, partial, quarter_turns, reason) = match &image.outcome {
+            Outcome::Used {
+                corner_count,
+                partial,
+                quarter_turns,
+            } => (*corner_count, *partial, Some(*quarter_turns), None),
+            Outcome::Refused(refusal) => (0, false, None, Some(refusal.to_string())),
+        };
+        let verdict = if reason.is_none() { "ok" } else { "refused" };
+        Self {
+            camera,
+            pose: image.pose,
+            file: image.path.clone(),
+            verdict,
+            corner_count,
+            partial,
+            quarter_turns,
+            reason,
+            figures: image.figures.as_ref().map(FiguresObject::from),
+        }
+    }
+
+    fn in_words(&self) -> String {
+        let file = self.file.file_name().unwrap_or_default().to_string_lossy();
+        let head = format!("{} pose {} ({file}): ", self.camera, self.pose);
+        match (&self.reason, &self.figures) {
+            (Some(reason), _) => format!("{head}refused: {reason}"),
+            (None, None) => format!("{head}{} corners", self.corner_count),
+            (None, Some(figures)) => format!(
+                "{head}{} corners{}, contrast {:.0} %, edges {:.1} px wide, sigma {:.3} px",
+                self.corner_count,
+                if self.partial {
+                    " (part of the board)"
+                } else {
+                    ""
+                },
+                figures.contrast_percent,
+                figures.edge_px,
+                figures.sigma_px
+            ),
+        }
+    }
+}
+
+impl From<&ImageFigures> for FiguresObject {
+    fn from(figures: &ImageFigures) -> Self {
+        Self {
+            contrast_percent: figures.contrast_percent,
+            edge_px: figures.edge_px,
+            square_px: figures.square_px,
+            residual_percent: figures.residual_percent,
+            sigma_px: figures.sigma_px,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::board::BoardSpec;
+    use crate::dataset::CameraSpec;
+    use crate::geometry::SensorSize;
+    use crate::progress::Silent;
+
+    #[test]
+    fn a_refused_image_is_named_in_words_and_in_json_and_framed_in_its_overlay() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("left07.png");
+        image::GrayImage::from_pixel(64, 48, image::Luma([90]))
+            .save(&path)
+            .unwrap();
+        let dataset = Dataset {
+            folder: folder.path().to_path_buf(),
+            board: BoardSpec {
+                rows: 6,
+                cols: 9,
+                square_mm: 25.0,
+            },
+            cameras: vec![CameraSpec {
+                name: "left".to_string(),
+                sensor: SensorSize::new(64, 48),
+                images: vec![None, Some(path)],
+            }],
+            stage: None,
+            excluded_poses: std::collections::BTreeSet::new(),
+        };
+        let overlays = folder.path().join("overlays");
+        let args = DetectArgs {
+            dataset: folder.path().to_path_buf(),
+            overlay: Some(overlays.clone()),
+            force: false,
+        };
+        let report = run(&args, &dataset, &Silent).unwrap();
+        assert!(report.views.is_empty());
+        let words = report.object.in_words();
+        assert!(words.contains("left pose 1 (left07.png): refused: too little contrast"));
+        assert!(words.ends_with("0 of 1 images used, 0 corners"));
+        let json = serde_json::to_value(&report.object).unwrap();
+        assert_eq!(json["images"][0]["verdict"], "refused");
+        assert_eq!(json["images"][0]["pose"], 1);
+        let overlay = image::open(overlays.join("left_001.png"))
+            .unwrap()
+            .to_rgb8();
+        assert_eq!(overlay.get_pixel(0, 0).0, [255, 0, 0]);
+    }
+}
