@@ -3,12 +3,13 @@
 use crate::atomic_file::WriteError;
 use crate::dataset::{CornersError, ManifestError, SufficiencyError};
 use crate::detect::DetectError;
+use crate::detect::overlay::OverlayError;
 use crate::init::InitError;
 use crate::joint::EstimateError;
-use crate::simulate::SimulateError;
 use crate::matches::MatchesError;
 use crate::pack::PackError;
 use crate::report::store::CalibrationError;
+use crate::simulate::SimulateError;
 use std::path::PathBuf;
 
 /// Why a command did not do what it was asked for.
@@ -21,21 +22,24 @@ pub enum Error {
     /// The corners of a dataset.
     #[error("the corners of the dataset cannot be used")]
     Corners(#[from] CornersError),
+    /// The search for corners in the images.
+    #[error("the corners cannot be found")]
+    Detect(#[from] DetectError),
+    /// Pictures of the corners found.
+    #[error("the overlays cannot be written")]
+    Overlay(#[from] OverlayError),
+    /// A dataset that was to be simulated.
+    #[error("the dataset cannot be simulated")]
+    Simulate(#[from] SimulateError),
     /// Corners that no estimate could work with.
     #[error("these corners cannot determine a calibration")]
     Sufficiency(#[from] SufficiencyError),
-    /// Images whose boards cannot be numbered alike.
-    #[error("the images cannot be used")]
-    Detect(#[from] DetectError),
     /// No starting point.
     #[error("no camera model explains these corners")]
     Init(#[from] InitError),
     /// No estimate.
     #[error("the estimate failed")]
     Estimate(#[from] EstimateError),
-    /// A simulation that cannot be made.
-    #[error("the simulation cannot be made")]
-    Simulate(#[from] SimulateError),
     /// A calibration that was read.
     #[error("the calibration cannot be used")]
     Calibration(#[from] CalibrationError),
@@ -188,6 +192,7 @@ impl Error {
             Self::Manifest(_)
             | Self::Corners(_)
             | Self::Detect(_)
+            | Self::Overlay(_)
             | Self::Simulate(_)
             | Self::Calibration(_)
             | Self::Blob(_)
@@ -205,7 +210,13 @@ impl Error {
             Self::Manifest(error) => error.remedy(),
             Self::Corners(error) => error.remedy(),
             Self::Sufficiency(error) => error.remedy(),
-            Self::Detect(_) | Self::Simulate(_) | Self::Json(_) => None,
+            Self::Detect(DetectError::NoImages) => None,
+            Self::Detect(_) => Some(
+                "look at the images with --overlay DIR; a board with an odd and an even number of corners cannot be turned unnoticed"
+                    .to_owned(),
+            ),
+            Self::Overlay(_) => Some("choose another folder for --overlay".to_owned()),
+            Self::Simulate(_) => Some("see calib-offline simulate --help".to_owned()),
             Self::Init(_) | Self::Estimate(_) => Some(
                 "look at the corners with calib-offline inspect, and at the images with detect \
                  --overlay; check rows, cols and the image size in dataset.toml, and record the \
@@ -216,6 +227,7 @@ impl Error {
             Self::Blob(error) => error.remedy(),
             Self::Matches(error) => error.remedy(),
             Self::Pack(error) => pack_remedy(error),
+            Self::Json(_) => None,
             Self::Write(error) => error.remedy(),
             Self::Usage(error) => error.remedy(),
         }

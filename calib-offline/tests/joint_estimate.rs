@@ -98,7 +98,11 @@ fn explore() {
 
 #[test]
 fn noise_free() {
-    for optics in std::env::var("OPTICS").unwrap_or("Brown,Paper,Bumps,Window,Port,Fisheye".into()).split(",").map(|name| <OpticsKind as clap::ValueEnum>::from_str(name, true).unwrap()) {
+    for optics in std::env::var("OPTICS")
+        .unwrap_or("Brown,Paper,Bumps,Window,Port,Fisheye".into())
+        .split(",")
+        .map(|name| <OpticsKind as clap::ValueEnum>::from_str(name, true).unwrap())
+    {
         let scene = Scene::new(SceneSettings::standard(optics, 1)).unwrap();
         let e = run(&scene);
         println!(

@@ -1,13 +1,18 @@
 //! What can be written on the command line. Each help text starts with an example.
 
-use super::{calibrate, demo, inspect, measure, pack, simulate};
+use super::{calibrate, demo, detect, inspect, measure, pack, simulate};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::num::NonZeroUsize;
 
 const EXAMPLE: &str = "\
 Example:
+  calib-offline detect recordings/monday
   calib-offline calibrate recordings/monday -o results/monday
   calib-offline measure results/monday/rig.rays matches.csv -o points.csv";
+
+const SIMULATE_EXAMPLE: &str = "\
+Example:
+  calib-offline simulate -o port --optics port --seed 7";
 
 const EXIT_CODES: &str = "\
 Exit codes:
@@ -39,13 +44,16 @@ pub enum Verb {
     Calibrate(calibrate::CalibrateArgs),
     /// Run the whole chain on the data that comes with the program
     Demo(demo::DemoArgs),
+    /// Find the board's corners in a dataset's images: corners.csv
+    Detect(detect::DetectArgs),
     /// Say what a dataset, a calibration or a blob is
     Inspect(inspect::InspectArgs),
     /// Triangulate matches
     Measure(measure::MeasureArgs),
     /// Pack a calibration for the device within a proven error
     Pack(pack::PackArgs),
-    /// Simulate a recording whose truth is known
+    /// Make a dataset with known truth
+    #[command(before_help = SIMULATE_EXAMPLE)]
     Simulate(simulate::SimulateArgs),
 }
 
@@ -61,8 +69,15 @@ pub struct CommonArgs {
     /// Say more; twice says most
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
-    /// Color the words that matter; NO_COLOR in the environment is respected
-    #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
+    /// When to color the words that matter.
+    #[arg(
+        long,
+        global = true,
+        value_name = "WHEN",
+        default_value = "auto",
+        hide_possible_values = true,
+        help = "Color the words that matter: auto (on a terminal, unless NO_COLOR is set), always, never"
+    )]
     pub color: ColorChoice,
     /// Use so many threads [default: all]; results do not depend on it
     #[arg(long, global = true, value_name = "COUNT")]

@@ -12,6 +12,7 @@ use crate::report::record::Grade;
 use crate::report::text;
 use clap::Args;
 use serde::Serialize;
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 const EXAMPLE: &str = "\
@@ -64,11 +65,13 @@ pub fn run(args: &DemoArgs, console: &Console, estimate: Estimate<'_>) -> Result
         console.narrate(&format!("dataset {}", folder.display()));
         let place = args.output.join(name);
         let written = calibrate_into(&place, &dataset, &settings, console, estimate)?;
-        words.push_str(&format!(
+        // Writing to a String cannot fail.
+        let _ = write!(
+            words,
             "{name}\n{}report          {}\n\n",
             text::summary(&written.calibration, Some(&written.blob)),
             place.join(FILES[2]).display()
-        ));
+        );
         datasets.push(DatasetObject {
             dataset: folder,
             facts: Facts::of(&written.calibration),

@@ -25,7 +25,11 @@ pub(super) fn of_command(error: &Error, console: &Console) -> ExitCode {
     let mut chain = vec![error.to_string()];
     let mut cause = error.source();
     while let Some(inner) = cause {
-        chain.push(inner.to_string());
+        let text = inner.to_string();
+        // Some errors already end with their cause.
+        if !chain.last().is_some_and(|outer| outer.ends_with(&text)) {
+            chain.push(text);
+        }
         cause = inner.source();
     }
     let word = console.painted("error:", Paint::Red);

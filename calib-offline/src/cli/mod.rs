@@ -6,6 +6,7 @@
 pub mod args;
 pub mod calibrate;
 pub mod demo;
+pub mod detect;
 mod failure;
 pub mod inspect;
 pub mod measure;
@@ -13,6 +14,7 @@ pub mod output;
 pub mod pack;
 pub mod place;
 pub mod progress;
+mod recording;
 mod rig_file;
 pub mod settings;
 pub mod simulate;
@@ -57,9 +59,10 @@ fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
     match verb {
         Verb::Calibrate(args) => calibrate::run(args, console, &crate::pipeline::calibrate),
         Verb::Demo(args) => demo::run(args, console, &crate::pipeline::calibrate),
+        Verb::Detect(args) => recording::detect(args, console),
         Verb::Inspect(args) => inspect::run(args, console),
         Verb::Measure(args) => measure::run(args, console),
         Verb::Pack(args) => pack::run(args, console),
-        Verb::Simulate(args) => simulate::run(args, console),
+        Verb::Simulate(args) => recording::simulate(args, console),
     }
 }

@@ -1,8 +1,5 @@
 //! `calib-offline simulate`: a dataset with known truth.
 
-use super::Outcome;
-use super::output::Console;
-use crate::error::Error;
 use crate::geometry::SensorSize;
 use crate::simulate::output::write_dataset;
 use crate::simulate::{
@@ -10,7 +7,6 @@ use crate::simulate::{
 };
 pub use crate::simulate::{SimulateError, SimulateSummary};
 use clap::{Args, ValueEnum};
-use serde::Serialize;
 use std::path::PathBuf;
 
 /// Example: `calib-offline simulate -o port --optics port --seed 7`
@@ -60,10 +56,6 @@ pub struct SimulateArgs {
     /// How often the stage is put somewhere else [default: 2, fisheye 5]
     #[arg(long, value_name = "N")]
     pub placements: Option<usize>,
-    /// How far apart the placements stand: 1 covers the image and cuts boards off at its edge;
-    /// 0.3 with --square-mm 8 keeps them whole
-    #[arg(long, default_value_t = 1.0, value_name = "SHARE")]
-    pub spread: f64,
     /// Dial readings per placement, degrees: FROM:STEP:TO or a list A,B,C
     /// [default: -40:5:40, fisheye -40:10:40]
     #[arg(long, allow_hyphen_values = true, value_name = "ANGLES")]
@@ -127,52 +119,12 @@ pub enum TargetKind {
     Ring,
 }
 
-/// Runs the command.
-///
-/// # Errors
-/// [`Error::Simulate`], with nothing written.
-pub fn run(args: &SimulateArgs, console: &Console) -> Result<Outcome, Error> {
-    let summary = simulate(args)?;
-    let words = format!(
-        "{}: {} cameras, {} poses, {} corners, {} images of the board\n\
-         a perfect calibration has {:.4} mm RMS on matches.csv ({} points) and {:.4} mm on \
-         holdout.csv ({})\n",
-        summary.folder.display(),
-        summary.camera_count,
-        summary.pose_count,
-        summary.corner_count,
-        summary.image_count,
-        summary.points_oracle_rms_mm,
-        summary.point_count,
-        summary.holdout_oracle_rms_mm,
-        summary.holdout_count,
-    );
-    let object = SimulateObject {
-        schema: "calib-offline/simulate/1",
-        summary: &summary,
-    };
-    console.result(&words, &object);
-    console.narrate(&format!(
-        "next: calib-offline calibrate {} -o RESULTS",
-        summary.folder.display()
-    ));
-    Ok(Outcome::Done)
-}
-
-/// What `--json` prints.
-#[derive(Debug, Serialize)]
-struct SimulateObject<'a> {
-    schema: &'static str,
-    #[serde(flatten)]
-    summary: &'a SimulateSummary,
-}
-
 /// Simulates and writes the dataset.
 ///
 /// # Errors
 /// As [`write_dataset`], and [`SimulateError::Argument`] or [`SimulateError::Scene`] if an option
 /// makes no sense.
-pub fn simulate(args: &SimulateArgs) -> Result<SimulateSummary, SimulateError> {
+pub fn run(args: &SimulateArgs) -> Result<SimulateSummary, SimulateError> {
     let scene = Scene::new(scene_settings(args)?)?;
     write_dataset(&scene, &output_settings(args)?, &args.output, args.force)
 }
@@ -184,7 +136,6 @@ fn scene_settings(args: &SimulateArgs) -> Result<SceneSettings, SimulateError> {
     settings.board.cols = args.cols;
     settings.board.square_mm = args.square_mm;
     settings.placements = args.placements.unwrap_or(settings.placements);
-    settings.spread = args.spread;
     if let Some(text) = &args.angles {
         settings.angles_deg = parse_angles(text)?;
     }

@@ -5,7 +5,7 @@ mod error;
 
 pub use error::ManifestError;
 
-use super::images::{matching_files, split_pattern};
+use super::image_files::{matching_files, split_pattern};
 use super::{CameraSpec, Dataset, StageSpec};
 use crate::board::BoardSpec;
 use crate::geometry::SensorSize;

@@ -3,7 +3,7 @@
 pub mod corners;
 pub mod identity;
 pub mod image;
-pub mod images;
+pub mod image_files;
 pub mod manifest;
 pub mod split;
 pub mod stage;

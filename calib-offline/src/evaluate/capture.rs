@@ -65,7 +65,7 @@ impl Capture {
             .enumerate()
             .map(|(camera_idx, camera)| {
                 let of_camera = views.iter().filter(|view| view.camera_idx == camera_idx);
-                camera_capture(&camera.name, camera.sensor, of_camera)
+                camera_capture(&camera.name, camera.sensor, &of_camera)
             })
             .collect();
         let all_poses = poses(views);
@@ -147,7 +147,7 @@ impl CameraCapture {
 fn camera_capture<'a>(
     name: &str,
     sensor: SensorSize,
-    views: impl Iterator<Item = &'a View> + Clone,
+    views: &(impl Iterator<Item = &'a View> + Clone),
 ) -> CameraCapture {
     let mut counts: Vec<usize> = views.clone().map(|view| view.corners.len()).collect();
     counts.sort_unstable();

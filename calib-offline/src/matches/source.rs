@@ -94,12 +94,11 @@ impl PointSource for RigSource<'_> {
     }
 
     fn point(&self, sightings: &[Sighting<f64>]) -> Result<Point<f64>, Status> {
-        let result = match *sightings {
-            [a, b] => self.rig.triangulate(&[pixel(a), pixel(b)]),
-            _ => {
-                let sightings: Vec<_> = sightings.iter().copied().map(pixel).collect();
-                self.rig.triangulate(&sightings)
-            }
+        let result = if let [a, b] = *sightings {
+            self.rig.triangulate(&[pixel(a), pixel(b)])
+        } else {
+            let sightings: Vec<_> = sightings.iter().copied().map(pixel).collect();
+            self.rig.triangulate(&sightings)
         };
         let found = result.map_err(|error| match error {
             MeasureError::Outside { .. } => Status::Outside,
@@ -157,12 +156,11 @@ impl PointSource for BlobSource<'_> {
     fn point(&self, sightings: &[Sighting<f32>]) -> Result<Point<f32>, Status> {
         let pixel =
             |(camera_idx, [u, v]): Sighting<f32>| (camera_idx, ray_runtime::PixelPoint::new(u, v));
-        let result = match *sightings {
-            [a, b] => self.blob.triangulate(pixel(a), pixel(b)),
-            _ => {
-                let sightings: Vec<_> = sightings.iter().copied().map(pixel).collect();
-                self.blob.triangulate_many(&sightings)
-            }
+        let result = if let [a, b] = *sightings {
+            self.blob.triangulate(pixel(a), pixel(b))
+        } else {
+            let sightings: Vec<_> = sightings.iter().copied().map(pixel).collect();
+            self.blob.triangulate_many(&sightings)
         };
         let found = result.map_err(|error| match error {
             ray_runtime::MeasureError::Behind => Status::Behind,

@@ -75,14 +75,13 @@ pub fn measure_stream<S: PointSource>(
         .and_then(|()| output.write_all(b"\n"))
         .map_err(StreamError::Write)?;
     while let Some(mut block) = blocks.next()? {
-        let columns = match &columns {
-            Some(columns) => columns,
-            None => {
-                let (header, rest) = first_line(block);
-                block = rest;
-                line += 1;
-                columns.insert(parse_header(file, header, &cameras)?)
-            }
+        let columns = if let Some(columns) = &columns {
+            columns
+        } else {
+            let (header, rest) = first_line(block);
+            block = rest;
+            line += 1;
+            columns.insert(parse_header(file, header, &cameras)?)
         };
         let pieces: Vec<Piece> = pieces(block)
             .into_par_iter()

@@ -2,16 +2,17 @@
 
 use super::Corners;
 use crate::adjust::Observations;
+use crate::adjust::StopReason;
 use crate::dataset::identity::input_sha256;
 use crate::dataset::{Dataset, stage};
 use crate::detect::verdict::Outcome;
-use crate::evaluate::fit_stage_axes;
 use crate::evaluate::HeldOut;
+use crate::evaluate::fit_stage_axes;
 use crate::evaluate::verdict::{Figures, Thresholds, judge};
-use crate::adjust::StopReason;
 use crate::joint::Estimate;
 use crate::report::record::{
-    Calibration, CornerRecord, EstimateRecord, HeldOutRecord, LeftOut, PoseRecord, SCHEMA, StageAxis,
+    Calibration, CornerRecord, EstimateRecord, HeldOutRecord, LeftOut, PoseRecord, SCHEMA,
+    StageAxis,
 };
 use nalgebra::Vector2;
 
@@ -33,7 +34,12 @@ pub struct Parts<'a> {
 
 /// The record of a calibration.
 pub fn record(parts: &Parts) -> Calibration {
-    let names: Vec<String> = parts.dataset.cameras.iter().map(|c| c.name.clone()).collect();
+    let names: Vec<String> = parts
+        .dataset
+        .cameras
+        .iter()
+        .map(|c| c.name.clone())
+        .collect();
     let estimate = parts.estimate;
     let rig = estimate.rig(&names);
     let corners = corner_records(estimate);

@@ -84,7 +84,6 @@ pub fn calibration() -> Calibration {
             rig_from_camera: *rig_from_camera,
         })
         .collect();
-    let corners_rejected = corners.iter().filter(|c| c.weight == 0.0).count();
     Calibration {
         schema: SCHEMA.to_owned(),
         tool_version: "0.1.0".to_owned(),
@@ -98,29 +97,12 @@ pub fn calibration() -> Calibration {
             cameras,
             datum_pose: 8,
         },
-        estimate: EstimateRecord {
-            cost_per_iteration: vec![
-                8.1e6, 9.4e5, 7.2e4, 3.1e4, 2.66e4, 2.641e4, 2.6402e4, 2.64019e4,
-            ],
-            stop_reason: "the cost changed by less than 1e-9 of itself".to_owned(),
-            sigma_px: SIGMA_PX,
-            rms_px: rms(&corners).unwrap_or(0.0),
-            corners_used: corners.len() - corners_rejected,
-            corners_rejected,
-        },
+        estimate: estimate(&corners),
         stage_axes: crate::evaluate::fit_stage_axes(&poses, |pose| Some(pose / 17)),
         poses,
         corners,
         left_out: left_out(),
-        held_out: Some(HeldOutRecord {
-            folds: 5,
-            rms_px: Some(0.0741),
-            median_px: Some(0.0602),
-            neighbor_rms_percent: Some(0.152),
-            rigid_rms_mm: Some(0.0113),
-            point_count: 5872,
-            outside_count: 41,
-        }),
+        held_out: Some(held_out()),
         verdict: Verdict {
             grade: Grade::Doubtful,
             reasons: vec![
@@ -128,6 +110,32 @@ pub fn calibration() -> Calibration {
                 "right: 79 % of the sensor is calibrated (limit 85 %)".to_owned(),
             ],
         },
+    }
+}
+
+fn estimate(corners: &[CornerRecord]) -> EstimateRecord {
+    let corners_rejected = corners.iter().filter(|c| c.weight == 0.0).count();
+    EstimateRecord {
+        cost_per_iteration: vec![
+            8.1e6, 9.4e5, 7.2e4, 3.1e4, 2.66e4, 2.641e4, 2.6402e4, 2.64019e4,
+        ],
+        stop_reason: "the cost changed by less than 1e-9 of itself".to_owned(),
+        sigma_px: SIGMA_PX,
+        rms_px: rms(corners).unwrap_or(0.0),
+        corners_used: corners.len() - corners_rejected,
+        corners_rejected,
+    }
+}
+
+fn held_out() -> HeldOutRecord {
+    HeldOutRecord {
+        folds: 5,
+        rms_px: Some(0.0741),
+        median_px: Some(0.0602),
+        neighbor_rms_percent: Some(0.152),
+        rigid_rms_mm: Some(0.0113),
+        point_count: 5872,
+        outside_count: 41,
     }
 }
 

@@ -53,6 +53,12 @@ pub enum CalibrationError {
     },
 }
 
+/// The one field that every version has.
+#[derive(serde::Deserialize)]
+struct OnlySchema {
+    schema: String,
+}
+
 impl CalibrationError {
     /// What to do about it.
     pub fn remedy(&self) -> Option<String> {
@@ -91,10 +97,6 @@ impl Calibration {
             column: error.column(),
             message: error.to_string(),
         };
-        #[derive(serde::Deserialize)]
-        struct OnlySchema {
-            schema: String,
-        }
         // The schema first: of another version only this field is known to exist.
         let OnlySchema { schema } = serde_json::from_slice(bytes).map_err(json_error)?;
         if schema != SCHEMA {
@@ -247,14 +249,14 @@ mod tests {
     fn tables_of_the_wrong_length_are_refused() {
         let camera = |v: &mut Value| v["rig"]["cameras"][1].take();
         let put = |v: &mut Value, c: Value| v["rig"]["cameras"][1] = c;
-        let changes: Vec<Box<dyn Fn(&mut Value)>> = vec![
-            Box::new(|c| c["field"]["direction"]["polynomial"]["degree"] = 16.into()),
-            Box::new(|c| c["field"]["direction"]["polynomial"]["degree"] = 2.into()),
-            Box::new(|c| c["field"]["sensor"]["width"] = 0.into()),
-            Box::new(|c| c["field"]["base"]["focal_px"] = 0.0.into()),
-            Box::new(|c| c["coverage"]["cells_u"] = 1.into()),
-            Box::new(|c| c["coverage"]["covered"] = Value::Array(Vec::new())),
-            Box::new(|c| c["name"] = "left".into()),
+        let changes: [fn(&mut Value); 7] = [
+            |c| c["field"]["direction"]["polynomial"]["degree"] = 16.into(),
+            |c| c["field"]["direction"]["polynomial"]["degree"] = 2.into(),
+            |c| c["field"]["sensor"]["width"] = 0.into(),
+            |c| c["field"]["base"]["focal_px"] = 0.0.into(),
+            |c| c["coverage"]["cells_u"] = 1.into(),
+            |c| c["coverage"]["covered"] = Value::Array(Vec::new()),
+            |c| c["name"] = "left".into(),
         ];
         for change in &changes {
             let error = changed(|v| {

@@ -38,26 +38,15 @@ fn args(folder: &Path) -> CalibrateArgs {
     }
 }
 
-/// A calibration coarse enough to pack quickly.
-fn quick() -> Calibration {
-    let mut calibration = example::calibration();
-    for camera in &mut calibration.rig.cameras {
-        camera.coverage.covered.fill(false);
-        let middle = camera.coverage.covered.len() / 2;
-        camera.coverage.covered[middle + 20] = true;
-    }
-    calibration
-}
-
 #[test]
 fn all_three_files_are_written_and_belong_together() {
     let folder = tempfile::tempdir().unwrap();
     dataset(folder.path());
     let args = args(folder.path());
-    let excluded = std::cell::RefCell::new(Vec::new());
+    let excluded = std::cell::RefCell::new(Vec::<usize>::new());
     let estimate = |dataset: &Dataset, _: &CalibrateSettings, _: &dyn Progress| {
         excluded.borrow_mut().extend(&dataset.excluded_poses);
-        Ok(quick())
+        Ok(example::calibration())
     };
     assert_eq!(run(&args, &console(), &estimate).unwrap(), Outcome::Done);
     assert_eq!(excluded.into_inner(), [3, 17]);
@@ -69,7 +58,7 @@ fn all_three_files_are_written_and_belong_together() {
     assert_eq!(names, ["calibration.json", "report.html", "rig.rays"]);
 
     let calibration = Calibration::load(&args.output.join("calibration.json")).unwrap();
-    assert_eq!(calibration, quick());
+    assert_eq!(calibration, example::calibration());
     let bytes = crate::pack::read_aligned(&args.output.join("rig.rays")).unwrap();
     let blob = ray_runtime::RayBlob::open(&bytes).unwrap();
     assert_eq!(blob.identity(), &calibration.identity());
@@ -84,7 +73,7 @@ fn all_three_files_are_written_and_belong_together() {
         force: true,
         ..args
     };
-    run(&forced, &console(), &|_, _, _| Ok(quick())).unwrap();
+    run(&forced, &console(), &|_, _, _| Ok(example::calibration())).unwrap();
     assert_eq!(fs::read(forced.output.join("report.html")).unwrap(), before);
 }
 
@@ -101,7 +90,7 @@ fn a_failed_verdict_is_written_and_told() {
     let folder = tempfile::tempdir().unwrap();
     dataset(folder.path());
     let args = args(folder.path());
-    let mut calibration = quick();
+    let mut calibration = example::calibration();
     calibration.verdict.grade = Grade::Fail;
     let outcome = run(&args, &console(), &|_, _, _| Ok(calibration.clone())).unwrap();
     assert_eq!(outcome, Outcome::VerdictFail);
@@ -121,7 +110,7 @@ fn an_estimate_that_fails_leaves_no_folder() {
     assert!(!folder.path().join("deep").exists());
 
     // A result that cannot be packed leaves none either.
-    let mut empty = quick();
+    let mut empty = example::calibration();
     empty.rig.cameras[0].coverage.covered.fill(false);
     let error = run(&args, &console(), &|_, _, _| Ok(empty.clone())).unwrap_err();
     assert_eq!(error.exit_code(), 3);

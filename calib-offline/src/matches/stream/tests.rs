@@ -1,5 +1,6 @@
 use super::*;
 use crate::matches::source::{Point, Sighting};
+use std::fmt::Write as _;
 
 /// x and y are the sums of the pixels, z the number of cameras. Pixels below zero are outside.
 struct Sums;
@@ -55,7 +56,7 @@ fn files_longer_than_a_block_keep_their_order() {
     let count = 400_000;
     let mut text = String::from(HEADER);
     for k in 0..count {
-        text.push_str(&format!("row{k},{k},1,0.25,7\n"));
+        let _ = writeln!(text, "row{k},{k},1,0.25,7");
     }
     assert!(text.len() > 2 * BLOCK_LEN);
     let (out, summary) = measure(text.as_bytes()).unwrap();
@@ -74,7 +75,7 @@ fn a_wrong_row_is_named_by_its_line_wherever_it_stands() {
         let mut text = String::from(HEADER);
         for line in 2..400_001 {
             let v = if line == wrong { "x" } else { "1" };
-            text.push_str(&format!("{line},{line}.5,{v},0.25,7\n"));
+            let _ = writeln!(text, "{line},{line}.5,{v},0.25,7");
         }
         let error = measure(text.as_bytes()).unwrap_err();
         assert!(

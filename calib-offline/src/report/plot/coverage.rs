@@ -5,6 +5,7 @@ use super::{Figure, WIDTH};
 use crate::field::CalibratedCamera;
 use crate::geometry::{PixelPoint, SensorSize};
 use crate::report::Calibration;
+use std::fmt::Write as _;
 
 /// From sensor to drawing: the whole sensor, outer edge to outer edge.
 #[derive(Debug, Clone, Copy)]
@@ -60,7 +61,8 @@ fn draw_camera(calibration: &Calibration, camera_idx: usize, camera: &Calibrated
         } else {
             &mut rejected
         };
-        dots.push_str(&format!("M{}h0", point(view.at(corner.observed))));
+        // Writing to a String cannot fail.
+        let _ = write!(dots, "M{}h0", point(view.at(corner.observed)));
         count += 1;
     }
     svg.path("dots", &used);
@@ -88,10 +90,11 @@ fn draw_mask(svg: &mut Svg, camera: &CalibratedCamera, view: &SensorView) {
             if !run[0] {
                 let from = [i as f64 * width, j as f64 * height];
                 let length = run.len() as f64 * width;
-                data.push_str(&format!(
+                let _ = write!(
+                    data,
                     "M{}h{length:.1}v{height:.1}h-{length:.1}z",
                     point(from)
-                ));
+                );
             }
             i += run.len();
         }

@@ -58,7 +58,11 @@ fn draw_one(calibration: &Calibration, title: &str, projection: &Matrix2x3<f64>)
     let mut svg = Svg::new(WIDTH, height);
     for shape in &shapes {
         let points: Vec<[f64; 2]> = shape.points.iter().map(at).collect();
-        svg.polygon(&shape.class, &points);
+        if points.len() == 2 {
+            svg.polyline(&shape.class, &points);
+        } else {
+            svg.polygon(&shape.class, &points);
+        }
     }
     for shape in &shapes {
         if let (Some(label), Some(point)) = (&shape.label, shape.points.first()) {
@@ -118,17 +122,26 @@ fn shapes(calibration: &Calibration) -> Vec<Shape> {
         .iter()
         .find(|pose| pose.pose == calibration.rig.datum_pose);
     shapes.extend(datum.map(|pose| board(&pose.rig_from_board, "board datum")));
-    // Drawn a little longer than a board is tall.
-    let half_mm = 0.7 * width_mm.max(height_mm);
-    shapes.extend(calibration.stage_axes.iter().map(|axis| Shape {
-        class: "stage".to_owned(),
-        points: vec![
-            axis.point_mm - axis.direction * half_mm,
-            axis.point_mm + axis.direction * half_mm,
-        ],
-        label: None,
-    }));
     let center = calibration.board.center_in_board();
+    let middle = calibration
+        .poses
+        .iter()
+        .map(|pose| pose.rig_from_board.point(&center))
+        .sum::<Vector3<f64>>()
+        / calibration.poses.len().max(1) as f64;
+    // Drawn beside the boards, a little longer than one is tall.
+    let half_mm = 0.7 * width_mm.max(height_mm);
+    shapes.extend(calibration.stage_axes.iter().map(|axis| {
+        let beside = axis.point_mm + axis.direction * (middle - axis.point_mm).dot(&axis.direction);
+        Shape {
+            class: "stage".to_owned(),
+            points: vec![
+                beside - axis.direction * half_mm,
+                beside + axis.direction * half_mm,
+            ],
+            label: None,
+        }
+    }));
     for camera in &calibration.rig.cameras {
         let origin = camera.rig_from_camera.translation_mm;
         let reach_mm = (center - origin).norm() / 4.0;

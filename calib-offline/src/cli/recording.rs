@@ -1,0 +1,80 @@
+//! `detect` and `simulate` on the console: where `corners.csv` goes, and how the outcome is told.
+
+use super::Outcome;
+use super::detect::{DetectArgs, DetectCommandError, run as run_detect};
+use super::output::Console;
+use super::simulate::{SimulateArgs, SimulateSummary, run as run_simulate};
+use crate::atomic_file::{check_folder, check_place};
+use crate::dataset::{Dataset, SufficiencyError, write_corners};
+use crate::error::{Error, UsageError};
+use crate::report::text::short;
+use serde::Serialize;
+
+/// Finds the corners of a dataset's images and writes `corners.csv`.
+///
+/// # Errors
+/// [`Error`]; without a single usable image nothing is written.
+pub(super) fn detect(args: &DetectArgs, console: &Console) -> Result<Outcome, Error> {
+    let dataset = Dataset::load(&args.dataset)?;
+    let path = dataset.corners_path();
+    check_place(&path)?;
+    if path.exists() && !args.force {
+        return Err(Error::Usage(UsageError::Exists { path }));
+    }
+    if let Some(folder) = &args.overlay {
+        check_folder(folder)?;
+    }
+    let report = run_detect(args, &dataset, console.progress()).map_err(|error| match error {
+        DetectCommandError::Detect(error) => Error::Detect(error),
+        DetectCommandError::Overlay(error) => Error::Overlay(error),
+    })?;
+    if report.views.is_empty() {
+        console.narrate(&report.object.in_words());
+        return Err(Error::Sufficiency(SufficiencyError::NoCorners));
+    }
+    write_corners(&path, &dataset, &report.views)?;
+    let words = format!(
+        "{}; written to {}",
+        report.object.in_words(),
+        path.display()
+    );
+    console.result(&words, &report.object);
+    console.narrate(&format!(
+        "then: calib-offline calibrate {} -o RESULTS",
+        args.dataset.display()
+    ));
+    Ok(Outcome::Done)
+}
+
+/// What `simulate --json` prints.
+#[derive(Debug, Serialize)]
+struct SimulateObject {
+    schema: &'static str,
+    #[serde(flatten)]
+    summary: SimulateSummary,
+}
+
+/// Makes a dataset with known truth.
+///
+/// # Errors
+/// [`Error`], with nothing written.
+pub(super) fn simulate(args: &SimulateArgs, console: &Console) -> Result<Outcome, Error> {
+    let summary = run_simulate(args)?;
+    let words = format!(
+        "{} cameras, {} poses, {} corners, {} images, {} + {} matches; a perfect calibration would be off by {} mm RMS; written to {}",
+        summary.camera_count,
+        summary.pose_count,
+        summary.corner_count,
+        summary.image_count,
+        summary.point_count,
+        summary.holdout_count,
+        short(summary.points_oracle_rms_mm),
+        summary.folder.display()
+    );
+    let object = SimulateObject {
+        schema: "calib-offline/simulate/1",
+        summary,
+    };
+    console.result(&words, &object);
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,230 @@
+//! What the tests that drive the real binary share: running it, and inputs for it.
+
+#![allow(dead_code, reason = "each test file uses its part")]
+
+use calib_offline::board::BoardSpec;
+use calib_offline::field::{BaseLens, CalibratedCamera, CoverageMask, Projection, RayField, Rig};
+use calib_offline::geometry::{PixelPoint, RigidTransform, SensorSize, so3};
+use calib_offline::report::Calibration;
+use calib_offline::report::record::{BoardShape, EstimateRecord, Grade, SCHEMA, Verdict};
+use nalgebra::Vector3;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+pub const BOARD: BoardSpec = BoardSpec {
+    rows: 6,
+    cols: 5,
+    square_mm: 20.0,
+};
+pub const SENSOR: SensorSize = SensorSize::new(640, 480);
+const FOCAL_PX: f64 = 600.0;
+
+/// What a run of the binary gave.
+#[derive(Debug)]
+pub struct Run {
+    pub code: i32,
+    pub stdout: String,
+    pub stderr: String,
+}
+
+impl Run {
+    /// The one object on standard output.
+    pub fn json(&self) -> serde_json::Value {
+        serde_json::from_str(&self.stdout)
+            .unwrap_or_else(|error| panic!("{error} in {:?}, {}", self.stdout, self.stderr))
+    }
+
+    #[track_caller]
+    pub fn assert_code(&self, code: i32) -> &Self {
+        assert_eq!(self.code, code, "{}\n{}", self.stdout, self.stderr);
+        self
+    }
+
+    #[track_caller]
+    pub fn assert_says(&self, parts: &[&str]) -> &Self {
+        for part in parts {
+            assert!(
+                self.stderr.contains(part),
+                "{part:?} is not in:\n{}",
+                self.stderr
+            );
+        }
+        self
+    }
+}
+
+/// Runs the binary in a folder.
+pub fn run(folder: &Path, arguments: &[&str]) -> Run {
+    run_with_input(folder, arguments, None)
+}
+
+/// The same, with something on its standard input.
+pub fn run_with_input(folder: &Path, arguments: &[&str], input: Option<&[u8]>) -> Run {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_calib-offline"))
+        .args(arguments)
+        .current_dir(folder)
+        .stdin(if input.is_some() {
+            Stdio::piped()
+        } else {
+            Stdio::null()
+        })
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    if let (Some(input), Some(mut stdin)) = (input, child.stdin.take()) {
+        std::io::Write::write_all(&mut stdin, input).unwrap();
+    }
+    let output = child.wait_with_output().unwrap();
+    Run {
+        code: output.status.code().expect("it was not killed"),
+        stdout: String::from_utf8(output.stdout).unwrap(),
+        stderr: String::from_utf8(output.stderr).unwrap(),
+    }
+}
+
+/// Every file below a folder with its content.
+pub fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut open = vec![folder.to_owned()];
+    while let Some(folder) = open.pop() {
+        for entry in std::fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.display().to_string();
+            if path.is_dir() {
+                found.insert(format!("{name}/"), Vec::new());
+                open.push(path);
+            } else {
+                found.insert(name, std::fs::read(&path).unwrap());
+            }
+        }
+    }
+    found
+}
+
+/// Two ideal cameras 120 mm apart that look at a place 500 mm away.
+pub fn rig() -> Rig {
+    let cameras = [("left", -1.0), ("right", 1.0)].map(|(name, side)| CalibratedCamera {
+        name: name.to_owned(),
+        field: RayField::ideal(
+            SENSOR,
+            BaseLens {
+                projection: Projection::Perspective,
+                focal_px: FOCAL_PX,
+            },
+            3,
+        ),
+        coverage: calibrated_middle(),
+        rig_from_camera: RigidTransform::new(
+            so3::exp(&Vector3::new(0.0, -side * 0.12, 0.0)),
+            Vector3::new(side * 60.0, 0.0, -500.0),
+        ),
+    });
+    Rig {
+        cameras: cameras.into(),
+        datum_pose: 0,
+    }
+}
+
+/// All but a margin of a tenth of the sensor.
+fn calibrated_middle() -> CoverageMask {
+    let at = |u, v| PixelPoint::new(f64::from(SENSOR.width) * u, f64::from(SENSOR.height) * v);
+    let corners = [at(0.1, 0.1), at(0.9, 0.1), at(0.9, 0.9), at(0.1, 0.9)];
+    CoverageMask::from_corners(SENSOR, corners.into_iter())
+}
+
+/// Where an ideal camera sees a point of the rig frame.
+pub fn project(rig: &Rig, camera_idx: usize, point_in_rig: &Vector3<f64>) -> PixelPoint {
+    let p = rig.cameras[camera_idx]
+        .rig_from_camera
+        .inverse()
+        .point(point_in_rig);
+    let center = SENSOR.center();
+    PixelPoint::new(
+        center.u + FOCAL_PX * p.x / p.z,
+        center.v + FOCAL_PX * p.y / p.z,
+    )
+}
+
+/// A calibration that says no more than what the rig is.
+pub fn calibration() -> Calibration {
+    Calibration {
+        schema: SCHEMA.to_owned(),
+        tool_version: "0.0.0".to_owned(),
+        method: "joint".to_owned(),
+        input_sha256: "0".repeat(64),
+        board: BOARD,
+        board_shape: BoardShape::default(),
+        rig: rig(),
+        poses: Vec::new(),
+        stage_axes: Vec::new(),
+        corners: Vec::new(),
+        left_out: Vec::new(),
+        estimate: EstimateRecord {
+            cost_per_iteration: Vec::new(),
+            stop_reason: "it was never begun".to_owned(),
+            sigma_px: 0.1,
+            rms_px: 0.14,
+            corners_used: 0,
+            corners_rejected: 0,
+        },
+        held_out: None,
+        verdict: Verdict {
+            grade: Grade::Pass,
+            reasons: Vec::new(),
+        },
+    }
+}
+
+pub const MANIFEST: &str = "\
+[board]
+kind = \"chessboard\"
+rows = 6
+cols = 5
+square_mm = 20.0
+
+[[camera]]
+name = \"left\"
+width = 640
+height = 480
+
+[[camera]]
+name = \"right\"
+width = 640
+height = 480
+";
+
+/// The corners of so many poses, seen by both cameras.
+pub fn corners_csv(pose_count: usize) -> String {
+    let rig = rig();
+    let mut text = String::from("camera,pose,row,col,u,v\n");
+    for pose in 0..pose_count {
+        let tilt = 0.25 * (pose as f64 - 2.0);
+        let rig_from_board = RigidTransform::new(
+            so3::exp(&Vector3::new(tilt, 0.4 - tilt, 0.1)),
+            Vector3::new(-40.0, -50.0, 10.0 * pose as f64),
+        );
+        for (camera_idx, camera) in rig.cameras.iter().enumerate() {
+            for row in 0..BOARD.rows {
+                for col in 0..BOARD.cols {
+                    let point = rig_from_board.point(&BOARD.corner_in_board(row, col));
+                    let pixel = project(&rig, camera_idx, &point);
+                    let name = &camera.name;
+                    text += &format!("{name},{pose},{row},{col},{},{}\n", pixel.u, pixel.v);
+                }
+            }
+        }
+    }
+    text
+}
+
+/// A folder with a dataset of six poses in `set`.
+pub fn dataset(manifest: &str, corners: &[u8]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let set = folder.path().join("set");
+    std::fs::create_dir(&set).unwrap();
+    std::fs::write(set.join("dataset.toml"), manifest).unwrap();
+    std::fs::write(set.join("corners.csv"), corners).unwrap();
+    folder
+}
