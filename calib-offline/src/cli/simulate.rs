@@ -56,6 +56,10 @@ pub struct SimulateArgs {
     /// How often the stage is put somewhere else [default: 2, fisheye 5]
     #[arg(long, value_name = "N")]
     pub placements: Option<usize>,
+    /// How far apart the placements stand: 1 covers the image and cuts boards off at its edge;
+    /// 0.3 with --square-mm 8 keeps them whole
+    #[arg(long, default_value_t = 1.0, value_name = "SHARE")]
+    pub spread: f64,
     /// Dial readings per placement, degrees: FROM:STEP:TO or a list A,B,C
     /// [default: -40:5:40, fisheye -40:10:40]
     #[arg(long, allow_hyphen_values = true, value_name = "ANGLES")]
@@ -136,6 +140,7 @@ fn scene_settings(args: &SimulateArgs) -> Result<SceneSettings, SimulateError> {
     settings.board.cols = args.cols;
     settings.board.square_mm = args.square_mm;
     settings.placements = args.placements.unwrap_or(settings.placements);
+    settings.spread = args.spread;
     if let Some(text) = &args.angles {
         settings.angles_deg = parse_angles(text)?;
     }
