@@ -169,6 +169,25 @@ impl GrayImage {
         self.values.iter().map(stretch).collect()
     }
 
+    /// Twice the size, bilinear between the pixels and constant beyond the outermost.
+    ///
+    /// Pixel (u, v) of the result is centered on (u / 2 - 0.25, v / 2 - 0.25) of this image. `None`
+    /// if that is more pixels than can be counted.
+    pub fn doubled(&self) -> Option<Self> {
+        let (width, height) = (self.sensor.width, self.sensor.height);
+        let double = SensorSize::new(width.checked_mul(2)?, height.checked_mul(2)?);
+        let place =
+            |k: u32, count: u32| (f64::from(k) / 2.0 - 0.25).clamp(0.0, f64::from(count) - 1.0);
+        let mut values = Vec::with_capacity(4 * self.values.len());
+        for v in 0..double.height {
+            for u in 0..double.width {
+                let value = self.between(place(u, width), place(v, height))?;
+                values.push(value as f32);
+            }
+        }
+        Self::from_values(double, values, self.white_level)
+    }
+
     /// Half the size, each pixel the mean of four; `None` below 2 x 2 pixels.
     ///
     /// Pixel (u, v) of the result is centered on (2u + 0.5, 2v + 0.5) of this image. An odd last
@@ -260,5 +279,11 @@ mod tests {
         assert_eq!(image.between(-0.01, 0.0), None);
         assert_eq!(image.between(f64::NAN, 0.0), None);
         assert_eq!(image.halved().unwrap().values, vec![15.0]);
+        let doubled = image.doubled().unwrap();
+        assert_eq!(&doubled.values[..4], &[0.0, 2.5, 7.5, 10.0]);
+        assert_eq!(
+            doubled.halved().unwrap().values,
+            [3.75, 11.25, 18.75, 26.25]
+        );
     }
 }

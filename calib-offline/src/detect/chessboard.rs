@@ -37,40 +37,59 @@ pub trait ChessboardDetector: Sync {
 ///
 /// The image is stretched to full contrast first, so that exposure does not matter, and tried at
 /// full, half and quarter size until the whole board is found: large blurred squares show their
-/// corners only in the small image.
+/// corners only in the small image. If most of the board is still missing, double size is tried:
+/// the detector needs squares of about eight pixels.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ChessTopologicalDetector;
 
-/// Sizes tried: full, half, quarter.
-const LEVELS: usize = 3;
+/// Reduced sizes tried: half and quarter.
+const SMALLER: [Scale; 2] = [Scale(2.0), Scale(4.0)];
 /// Fractions of the pixels that are allowed to saturate when the image is stretched.
 const STRETCH_QUANTILES: [f64; 2] = [0.005, 0.995];
 
 impl ChessboardDetector for ChessTopologicalDetector {
     fn detect(&self, image: &GrayImage, board: &BoardSpec) -> Vec<RawCorner> {
-        let mut best: Vec<RawCorner> = Vec::new();
-        let mut smaller: Option<GrayImage> = None;
-        for level in 0..LEVELS {
-            let at_level = smaller.as_ref().unwrap_or(image);
-            let found = detect_at_level(at_level, level);
-            // A corner more or less at a smaller size is no reason to give up the sharper one.
-            if found.len() > best.len() + best.len() / 10 {
-                best = found;
-            }
+        let mut best = detect_at(image, Scale::FULL);
+        let mut smaller = None;
+        for scale in SMALLER {
             if best.len() >= board.corner_count() {
-                break;
+                return best;
             }
-            let next = at_level.halved();
-            if next.is_none() {
-                break;
-            }
-            smaller = next;
+            smaller = smaller.as_ref().unwrap_or(image).halved();
+            let Some(at_scale) = &smaller else { break };
+            take_larger(&mut best, detect_at(at_scale, scale));
+        }
+        if 2 * best.len() < board.corner_count()
+            && let Some(double) = image.doubled()
+        {
+            take_larger(&mut best, detect_at(&double, Scale::DOUBLE));
         }
         best
     }
 }
 
-fn detect_at_level(image: &GrayImage, level: usize) -> Vec<RawCorner> {
+/// A corner more or less at another size is no reason to give up the sharper ones.
+fn take_larger(best: &mut Vec<RawCorner>, found: Vec<RawCorner>) {
+    if found.len() > best.len() + best.len() / 10 {
+        *best = found;
+    }
+}
+
+/// Pixels of the original per pixel of a resized image.
+#[derive(Debug, Clone, Copy)]
+struct Scale(f64);
+
+impl Scale {
+    const FULL: Self = Self(1.0);
+    const DOUBLE: Self = Self(0.5);
+
+    /// In the original; pixels are areas whose outer edges coincide.
+    fn original(self, x: f32) -> f64 {
+        (f64::from(x) + 0.5) * self.0 - 0.5
+    }
+}
+
+fn detect_at(image: &GrayImage, scale: Scale) -> Vec<RawCorner> {
     let [black, white] = image.quantiles(STRETCH_QUANTILES);
     let stretched = image.stretched(black, white);
     let view = GrayImageView {
@@ -83,8 +102,6 @@ fn detect_at_level(image: &GrayImage, level: usize) -> Vec<RawCorner> {
     let Ok(grid) = TopologicalGrid::new(ChessboardParams::default()) else {
         return Vec::new();
     };
-    let scale = f64::from(1u32 << level);
-    let full_size = |x: f32| f64::from(x) * scale + (scale - 1.0) / 2.0;
     let largest = grid.detect(&corners);
     let corners = largest.map(|found| found.corners).unwrap_or_default();
     corners
@@ -92,7 +109,10 @@ fn detect_at_level(image: &GrayImage, level: usize) -> Vec<RawCorner> {
         .map(|corner| RawCorner {
             i: corner.grid.u,
             j: corner.grid.v,
-            pixel: PixelPoint::new(full_size(corner.position.x), full_size(corner.position.y)),
+            pixel: PixelPoint::new(
+                scale.original(corner.position.x),
+                scale.original(corner.position.y),
+            ),
         })
         .collect()
 }

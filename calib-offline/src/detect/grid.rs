@@ -35,6 +35,11 @@ const REACH_SQUARES: f64 = 0.2;
 const MIN_AMPLITUDE_OF_MEDIAN: f64 = 0.3;
 /// RMS residual against amplitude. A T-junction, where the board ends, has about 0.5.
 const MAX_RESIDUAL_OF_AMPLITUDE: f64 = 0.4;
+/// Corners that scatter more than this factor above the median ...
+const MAX_SIGMA_OF_MEDIAN: f64 = 4.0;
+/// ... and more than this are dropped, px: on rendered images they are off by up to a pixel, the
+/// others by less than 0.1 px.
+const MIN_SIGMA_LIMIT_PX: f64 = 0.05;
 /// Stray corners that may be cut off a grid that is larger than the board: this part of it.
 const MAX_STRAY_PART: f64 = 0.1;
 
@@ -74,6 +79,9 @@ impl FittedGrid {
         grid.corners
             .retain(|&node, corner| is_board_corner(node, corner, dark, amplitude));
         grid.complete(image, board, max_half_window_px);
+        let Typical { sigma_px, .. } = grid.typical()?;
+        let limit_px = (MAX_SIGMA_OF_MEDIAN * sigma_px).max(MIN_SIGMA_LIMIT_PX);
+        grid.corners.retain(|_, corner| corner.sigma_px <= limit_px);
         (grid.corners.len() >= 4).then_some(grid)
     }
 
