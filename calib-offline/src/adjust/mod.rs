@@ -4,6 +4,7 @@
 
 mod assembly;
 pub mod banded;
+pub mod covariance;
 pub mod knots;
 pub mod levenberg;
 pub mod model;

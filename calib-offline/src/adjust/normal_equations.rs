@@ -142,7 +142,7 @@ pub struct NormalEquations {
     poses: Vec<Matrix6<f64>>,
     pose_gradients: Vec<Vector6<f64>>,
     /// Global x 6 per pose.
-    coupling: Vec<DMatrix<f64>>,
+    pub(super) coupling: Vec<DMatrix<f64>>,
     splines: Vec<Option<SplineBlock>>,
 }
 
@@ -573,14 +573,14 @@ impl SplineBlock {
 #[derive(Debug, Clone)]
 pub struct Reduced {
     /// Of the global parameters, and of the poses behind them if splines were eliminated.
-    border: Cholesky<f64, Dyn>,
+    pub(super) border: Cholesky<f64, Dyn>,
     right: DVector<f64>,
-    global_len: usize,
-    eliminated: Eliminated,
+    pub(super) global_len: usize,
+    pub(super) eliminated: Eliminated,
 }
 
 #[derive(Debug, Clone)]
-enum Eliminated {
+pub(super) enum Eliminated {
     Poses(Vec<Cholesky<f64, nalgebra::Const<6>>>),
     /// Border columns and factor per camera with a spline.
     Splines(Vec<Option<(Vec<usize>, EliminatedSpline)>>),
@@ -588,9 +588,9 @@ enum Eliminated {
 
 /// `F = L L^T`, `Y = L^-1 E`, `L^-1 gradient`.
 #[derive(Debug, Clone)]
-struct EliminatedSpline {
-    factor: BandedCholesky,
-    y_transposed: DMatrix<f64>,
+pub(super) struct EliminatedSpline {
+    pub(super) factor: BandedCholesky,
+    pub(super) y_transposed: DMatrix<f64>,
     solved_gradient: DVector<f64>,
 }
 
@@ -685,7 +685,7 @@ fn fixed_columns(layout: &Layout, camera_idx: usize) -> impl Iterator<Item = Opt
 
 /// What a unit of each of a camera's polynomial parameters (columns: direction, then offset) does
 /// to the coefficients of its components (rows, see [`Components`]).
-fn parameters_to_columns(camera: &CameraModel) -> DMatrix<f64> {
+pub(super) fn parameters_to_columns(camera: &CameraModel) -> DMatrix<f64> {
     let components = Components::of(camera);
     let direction = camera.basis.coefficients();
     let offset_len = camera.offset_amounts().len();

@@ -26,6 +26,7 @@ impl Estimate {
         Rig {
             cameras,
             datum_pose: self.observations.poses.first().copied().unwrap_or(0),
+            uncertainty: Vec::new(),
         }
     }
 

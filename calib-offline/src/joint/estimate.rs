@@ -43,6 +43,8 @@ pub struct Estimate {
     pub costs: Vec<f64>,
     /// Why the last adjustment ended.
     pub stop: StopReason,
+    /// The fit behind it all.
+    pub(super) fit: Fit,
 }
 
 /// Why there is no estimate.
@@ -157,14 +159,15 @@ fn finish(
         .collect();
     Estimate {
         smoothness: fit.smoothness.found(&fit.model),
-        model: fit.model,
+        model: fit.model.clone(),
         observations,
         residuals,
         robust_weights,
         noise: fit.noise,
         neighbor_correlation,
         choices,
-        costs: fit.costs,
+        costs: fit.costs.clone(),
         stop: fit.stop,
+        fit,
     }
 }

@@ -4,6 +4,7 @@
 pub mod calibrated;
 pub mod choice;
 pub mod correlation;
+pub mod covariance;
 pub mod estimate;
 pub mod evidence;
 pub mod fit;

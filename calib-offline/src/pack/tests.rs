@@ -94,6 +94,7 @@ pub fn fisheye_camera() -> CalibratedCamera {
 
 fn rig(cameras: Vec<CalibratedCamera>) -> Rig {
     Rig {
+        uncertainty: Vec::new(),
         cameras,
         datum_pose: 0,
     }

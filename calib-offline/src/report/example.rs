@@ -94,6 +94,7 @@ pub fn calibration() -> Calibration {
             terms: vec![(2, 0, 0.03), (0, 2, -0.02)],
         },
         rig: Rig {
+            uncertainty: Vec::new(),
             cameras,
             datum_pose: 8,
         },
