@@ -2,6 +2,7 @@
 
 use crate::atomic_file::WriteError;
 use crate::dataset::{CornersError, ManifestError, SufficiencyError};
+use crate::demo::DemoError;
 use crate::detect::DetectError;
 use crate::detect::overlay::OverlayError;
 use crate::init::InitError;
@@ -58,6 +59,9 @@ pub enum Error {
     /// A result that was to be written.
     #[error("the result cannot be written")]
     Write(#[from] WriteError),
+    /// A demo that could not measure.
+    #[error("the demo cannot measure")]
+    Demo(#[from] DemoError),
     /// A request that cannot be met.
     #[error("the command cannot be run so")]
     Usage(#[from] UsageError),
@@ -198,6 +202,7 @@ impl Error {
             | Self::Blob(_)
             | Self::Matches(_)
             | Self::Pack(_)
+            | Self::Demo(_)
             | Self::Json(_)
             | Self::Write(_)
             | Self::Usage(_) => 2,
@@ -227,7 +232,7 @@ impl Error {
             Self::Blob(error) => error.remedy(),
             Self::Matches(error) => error.remedy(),
             Self::Pack(error) => pack_remedy(error),
-            Self::Json(_) => None,
+            Self::Json(_) | Self::Demo(_) => None,
             Self::Write(error) => error.remedy(),
             Self::Usage(error) => error.remedy(),
         }
