@@ -7,8 +7,11 @@
 use super::banded::BandedMatrix;
 use crate::field::spline::SplineGrid;
 
-/// Keeps the energy positive definite: linear functions have none of their own.
-const RIDGE: f64 = 1e-6;
+/// Keeps the energy positive definite, and linear functions, which have no energy of their own, out
+/// of the spline: a constant in it would turn the camera, which only the held directions of the
+/// polynomial forbid (with 1e-6 that mode stayed open on a fisheye and an adjustment crept). At this
+/// size it begins to count for waves longer than 35 knots, which are the polynomial's to follow.
+const RIDGE: f64 = 1e-3;
 
 /// Order of the knots of one grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
