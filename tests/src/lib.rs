@@ -1,7 +1,6 @@
 //! Fixtures of the tests that cross the crates: simulated recordings, their calibration, and
 //! devices that hold the blob.
 
-use calib_offline::adjust::Observations;
 use calib_offline::board::BoardSpec;
 use calib_offline::dataset::Dataset;
 use calib_offline::demo::known::Pair;
@@ -147,10 +146,4 @@ pub fn pairs(scene: &Scene, count: usize) -> Vec<Pair> {
 /// Bytes on a multiple of 8, as the runtime asks for.
 pub fn aligned(packed: &Packed) -> AlignedBytes {
     AlignedBytes::from(packed.bytes.as_slice())
-}
-
-/// The corners of a scene, arranged for an estimate.
-pub fn observations(scene: &Scene) -> Observations {
-    let sensors = scene.cameras.iter().map(|camera| camera.sensor()).collect();
-    Observations::new(scene.settings.board, sensors, &scene.observe_corners())
 }

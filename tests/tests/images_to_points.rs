@@ -5,7 +5,7 @@ use calib_offline::adjust::residual::linearize;
 use calib_offline::demo::device::check;
 use calib_offline::geometry::PixelPoint;
 use calib_offline::report::Calibration;
-use calib_offline::simulate::{MatchSet, OpticsKind};
+use calib_offline::simulate::{MatchSet, OpticsKind, Scene};
 use firmware_sim::qemu::{QemuDevice, build_image};
 use ray_runtime::RayBlob;
 use std::fs;
@@ -22,8 +22,8 @@ use workspace_tests::{
 /// is for what the detector gets wrong in the same way everywhere.
 const MOST_RATIO: f64 = 1.03;
 
-/// The chain up to the device; the calibration for further questions.
-fn chain(optics: OpticsKind) -> Calibration {
+/// The chain up to the device; the scene and its calibration for further questions.
+fn chain(optics: OpticsKind) -> (Scene, Calibration) {
     let folder = tempfile::tempdir().unwrap();
     let scene = small_scene(optics, 11);
     let dataset = record(&scene, true, &folder.path().join("set"));
@@ -43,25 +43,25 @@ fn chain(optics: OpticsKind) -> Calibration {
         // The corners that were found reach as far as the true ones, but for those at the border.
         assert!(without_point < 500 / 20, "{set:?}: {without_point}");
     }
-    calibration
+    (scene, calibration)
 }
 
 #[test]
 fn central_optics() {
-    let calibration = chain(OpticsKind::Brown);
+    let (scene, calibration) = chain(OpticsKind::Brown);
     let cameras = &calibration.rig.cameras;
     assert!(cameras.iter().all(|camera| camera.field.is_central()));
     every_pixel_has_the_ray_of_the_field(&calibration);
-    the_cortex_m_gives_the_bits_of_the_host(&calibration);
+    the_cortex_m_gives_the_bits_of_the_host(&scene, &calibration);
 }
 
 #[test]
 fn rays_that_do_not_meet() {
-    let calibration = chain(OpticsKind::Port);
+    let (scene, calibration) = chain(OpticsKind::Port);
     let cameras = &calibration.rig.cameras;
     assert!(cameras.iter().all(|camera| !camera.field.is_central()));
     every_pixel_has_the_ray_of_the_field(&calibration);
-    the_cortex_m_gives_the_bits_of_the_host(&calibration);
+    the_cortex_m_gives_the_bits_of_the_host(&scene, &calibration);
 }
 
 /// The blob on its way through a file and the runtime, against the calibration on its way through
@@ -98,17 +98,16 @@ fn every_pixel_has_the_ray_of_the_field(calibration: &Calibration) {
 }
 
 /// Needs QEMU and a bare-metal toolchain; `tests/run` installs them first.
-fn the_cortex_m_gives_the_bits_of_the_host(calibration: &Calibration) {
+fn the_cortex_m_gives_the_bits_of_the_host(scene: &Scene, calibration: &Calibration) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("rig.rays");
     let packed = packed(calibration);
     fs::write(&file, &packed.bytes).unwrap();
-    let scene = small_scene(OpticsKind::Brown, 11);
     let image = build_image("device").unwrap();
     let device = QemuDevice::start(loopback(), &image, Some(&file)).unwrap();
     let blob = aligned(&packed);
     let blob = RayBlob::open(&blob).unwrap();
-    let checked = check(device.address(), &blob, &pairs(&scene, 500)).unwrap();
+    let checked = check(device.address(), &blob, &pairs(scene, 500)).unwrap();
     assert_eq!(checked.device, "firmware-sim cortex-m");
     assert_eq!((checked.matches, checked.different), (500, 0));
     assert!(checked.points > 400, "{checked:?}");
