@@ -145,7 +145,7 @@ impl UsageError {
     /// What to do about it.
     pub fn remedy(&self) -> Option<String> {
         let text = match self {
-            Self::Exists { .. } => "choose another place with -o, or replace it with --force",
+            Self::Exists { .. } => "choose another place, or replace it with --force",
             Self::UnknownKind { .. } | Self::NotFound { .. } => "check the path",
             Self::UnknownFrame { .. } => {
                 "leave --frame out for the rig's own frame, or name one of its cameras"
@@ -215,7 +215,7 @@ impl Error {
             Self::Manifest(error) => error.remedy(),
             Self::Corners(error) => error.remedy(),
             Self::Sufficiency(error) => error.remedy(),
-            Self::Detect(DetectError::NoImages) => None,
+            Self::Detect(DetectError::NoImages) | Self::Json(_) | Self::Demo(_) => None,
             Self::Detect(_) => Some(
                 "look at the images with --overlay DIR; a board with an odd and an even number of corners cannot be turned unnoticed"
                     .to_owned(),
@@ -232,7 +232,6 @@ impl Error {
             Self::Blob(error) => error.remedy(),
             Self::Matches(error) => error.remedy(),
             Self::Pack(error) => pack_remedy(error),
-            Self::Json(_) | Self::Demo(_) => None,
             Self::Write(error) => error.remedy(),
             Self::Usage(error) => error.remedy(),
         }
