@@ -1,6 +1,11 @@
 //! Fixtures of the tests that cross the crates: simulated recordings, their calibration, and
 //! devices that hold the blob.
 
+#![allow(
+    clippy::missing_panics_doc,
+    reason = "a fixture that cannot be made is a failed test"
+)]
+
 use calib_offline::board::BoardSpec;
 use calib_offline::dataset::Dataset;
 use calib_offline::demo::known::Pair;
