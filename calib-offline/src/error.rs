@@ -2,6 +2,7 @@
 
 use crate::atomic_file::WriteError;
 use crate::dataset::{CornersError, ManifestError, SufficiencyError};
+use crate::demo::DemoError;
 use crate::detect::DetectError;
 use crate::detect::overlay::OverlayError;
 use crate::init::InitError;
@@ -58,6 +59,9 @@ pub enum Error {
     /// A result that was to be written.
     #[error("the result cannot be written")]
     Write(#[from] WriteError),
+    /// A demo that could not measure.
+    #[error("the demo cannot measure")]
+    Demo(#[from] DemoError),
     /// A request that cannot be met.
     #[error("the command cannot be run so")]
     Usage(#[from] UsageError),
@@ -141,7 +145,7 @@ impl UsageError {
     /// What to do about it.
     pub fn remedy(&self) -> Option<String> {
         let text = match self {
-            Self::Exists { .. } => "choose another place with -o, or replace it with --force",
+            Self::Exists { .. } => "choose another place, or replace it with --force",
             Self::UnknownKind { .. } | Self::NotFound { .. } => "check the path",
             Self::UnknownFrame { .. } => {
                 "leave --frame out for the rig's own frame, or name one of its cameras"
@@ -198,6 +202,7 @@ impl Error {
             | Self::Blob(_)
             | Self::Matches(_)
             | Self::Pack(_)
+            | Self::Demo(_)
             | Self::Json(_)
             | Self::Write(_)
             | Self::Usage(_) => 2,
@@ -210,7 +215,7 @@ impl Error {
             Self::Manifest(error) => error.remedy(),
             Self::Corners(error) => error.remedy(),
             Self::Sufficiency(error) => error.remedy(),
-            Self::Detect(DetectError::NoImages) => None,
+            Self::Detect(DetectError::NoImages) | Self::Json(_) | Self::Demo(_) => None,
             Self::Detect(_) => Some(
                 "look at the images with --overlay DIR; a board with an odd and an even number of corners cannot be turned unnoticed"
                     .to_owned(),
@@ -227,7 +232,6 @@ impl Error {
             Self::Blob(error) => error.remedy(),
             Self::Matches(error) => error.remedy(),
             Self::Pack(error) => pack_remedy(error),
-            Self::Json(_) => None,
             Self::Write(error) => error.remedy(),
             Self::Usage(error) => error.remedy(),
         }

@@ -5,6 +5,7 @@ pub mod atomic_file;
 pub mod board;
 pub mod cli;
 pub mod dataset;
+pub mod demo;
 pub mod detect;
 pub mod error;
 pub mod evaluate;

@@ -12,8 +12,8 @@ use crate::dataset::sufficiency::check_sufficiency;
 use crate::dataset::{Dataset, View};
 use crate::detect::{self, DetectSettings};
 use crate::error::{Error, UsageError};
-use crate::evaluate::held_out::{HeldOut, held_out};
 use crate::evaluate::verdict::Thresholds;
+use crate::evaluate::{Folds, estimate_folds, held_out};
 use crate::init::rig::start_rig;
 use crate::joint::estimate;
 use crate::progress::Progress;
@@ -95,6 +95,15 @@ pub fn corners(
     })
 }
 
+/// A calibration, and what its held-out check was made from.
+#[derive(Debug)]
+pub struct Checked {
+    /// The calibration.
+    pub calibration: Calibration,
+    /// The estimates of the held-out check, for whoever wants to measure with them.
+    pub folds: Folds,
+}
+
 /// Calibrates a dataset.
 ///
 /// Deterministic: the same input gives the same result on the same build, whatever the number of
@@ -108,10 +117,11 @@ pub fn calibrate(
     progress: &dyn Progress,
 ) -> Result<Calibration, Error> {
     let corners = corners(dataset, &settings.detect, progress)?;
-    calibrate_corners(dataset, &corners, settings, progress)
+    let checked = calibrate_corners(dataset, &corners, settings, progress)?;
+    Ok(checked.calibration)
 }
 
-/// [`calibrate`] from corners that are there already.
+/// [`calibrate`] from corners that are there already; keeps what the check was made from.
 ///
 /// # Errors
 /// Data that cannot determine the answer.
@@ -120,7 +130,7 @@ pub fn calibrate_corners(
     corners: &Corners,
     settings: &CalibrateSettings,
     progress: &dyn Progress,
-) -> Result<Calibration, Error> {
+) -> Result<Checked, Error> {
     if settings.method != Method::Joint {
         return Err(Error::Usage(UsageError::NoSuchMethod {
             method: settings.method.name(),
@@ -139,20 +149,21 @@ pub fn calibrate_corners(
     let estimate = estimate(&observations, &start)?;
     progress.end();
 
-    let unseen = if observations.poses.len() >= 2 * crate::dataset::sufficiency::MIN_POSES {
+    let folds = if observations.poses.len() >= 2 * crate::dataset::sufficiency::MIN_POSES {
         progress.begin("check on held-out poses", settings.folds);
-        let unseen = held_out(&observations, settings.folds, progress);
+        let folds = estimate_folds(&observations, settings.folds, progress);
         progress.end();
-        unseen
+        folds
     } else {
-        HeldOut::default()
+        Folds::default()
     };
-    Ok(summary::record(&summary::Parts {
+    let calibration = summary::record(&summary::Parts {
         dataset,
         corners,
         observations: &observations,
         estimate: &estimate,
-        held_out: &unseen,
+        held_out: &held_out(&folds),
         thresholds: &settings.thresholds,
-    }))
+    });
+    Ok(Checked { calibration, folds })
 }

@@ -1,6 +1,8 @@
 //! Bad datasets, given to the real binary: each is refused with the right exit code and a message
 //! that names the place and the remedy, and nothing is left half-written.
 
+#![allow(clippy::format_push_string, reason = "shorter than write! in a test")]
+
 mod common;
 
 use common::{MANIFEST, contents, corners_csv, dataset, run};

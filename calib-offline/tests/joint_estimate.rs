@@ -8,7 +8,11 @@ use calib_offline::simulate::{MatchSet, OpticsKind, Scene, SceneSettings};
 use nalgebra::{Matrix3, Vector3};
 
 fn run(scene: &Scene) -> Estimate {
-    let sensors = scene.cameras.iter().map(|c| c.sensor()).collect();
+    let sensors = scene
+        .cameras
+        .iter()
+        .map(calib_offline::simulate::CameraOptics::sensor)
+        .collect();
     let observations = Observations::new(scene.settings.board, sensors, &scene.observe_corners());
     let t = std::time::Instant::now();
     let start = start_rig(&observations).unwrap();
@@ -100,7 +104,7 @@ fn explore() {
 fn noise_free() {
     for optics in std::env::var("OPTICS")
         .unwrap_or("Brown,Paper,Bumps,Window,Port,Fisheye".into())
-        .split(",")
+        .split(',')
         .map(|name| <OpticsKind as clap::ValueEnum>::from_str(name, true).unwrap())
     {
         let scene = Scene::new(SceneSettings::standard(optics, 1)).unwrap();

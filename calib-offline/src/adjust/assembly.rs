@@ -164,12 +164,12 @@ pub fn view_sums(
     small.fill_lower_triangle_with_upper_triangle();
     let mut field = DMatrix::zeros(components.len(), components.len());
     let mut field_small = DMatrix::zeros(components.len(), small_len);
-    for a in 0..count {
+    for (a, crossed_a) in crossed.iter().enumerate() {
         let products_a = basis.products.columns(0, components.terms(a));
         let rows = (components.start(a), components.terms(a));
         field_small
             .rows_mut(rows.0, rows.1)
-            .gemm_tr(1.0, &products_a, &crossed[a], 0.0);
+            .gemm_tr(1.0, &products_a, crossed_a, 0.0);
         for b in a..count {
             let mut scaled = basis.products.columns(0, components.terms(b)).into_owned();
             let weights = pairs.column(pair(count, a, b));

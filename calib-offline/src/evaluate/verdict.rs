@@ -197,11 +197,14 @@ mod tests {
         }
     }
 
+    /// Makes one figure bad.
+    type Spoil = fn(&mut Figures);
+
     #[test]
     fn good_figures_pass_and_each_bad_one_lowers_the_grade() {
         let thresholds = Thresholds::default();
         assert_eq!(judge(&good(), &thresholds).grade, Grade::Pass);
-        let cases: [(fn(&mut Figures), Grade); 6] = [
+        let cases: [(Spoil, Grade); 6] = [
             (|f| f.sigma_px = 0.4, Grade::Doubtful),
             (|f| f.sigma_px = f64::NAN, Grade::Fail),
             (|f| f.held_out_rms_px = Some(0.5), Grade::Fail),

@@ -26,7 +26,8 @@ const NEEDED_GAIN: f64 = 4.0;
 pub struct Choice {
     /// In words.
     pub what: String,
-    /// Twice its log evidence minus that of the model that was best until then.
+    /// Twice its log evidence minus that of the model that was best until then; minus infinity if
+    /// the data leave a parameter of it open.
     pub gain: f64,
     /// Whether it was taken.
     pub taken: bool,
@@ -60,13 +61,7 @@ impl Candidate {
 }
 
 /// Takes what the evidence asks for, starting from a settled fit without spline and offset.
-///
-/// # Errors
-/// [`EstimateError::Singular`].
-pub fn choose(
-    start: Candidate,
-    observations: &Observations,
-) -> Result<(Candidate, Vec<Choice>), EstimateError> {
+pub fn choose(start: Candidate, observations: &Observations) -> (Candidate, Vec<Choice>) {
     let mut best = start;
     let mut tried = Vec::new();
     take_if_better(
@@ -76,7 +71,7 @@ pub fn choose(
         NEEDED_GAIN,
         observations,
         add_offsets,
-    )?;
+    );
     for cells in CELLS {
         let taken = take_if_better(
             &mut best,
@@ -85,24 +80,17 @@ pub fn choose(
             NEEDED_GAIN,
             observations,
             |model| set_spline(model, cells),
-        )?;
+        );
         if !taken {
             break;
         }
     }
-    simplify(&mut best, &mut tried, observations)?;
-    Ok((best, tried))
+    simplify(&mut best, &mut tried, observations);
+    (best, tried)
 }
 
 /// Drops what the evidence no longer asks for: offsets camera by camera, then splines.
-///
-/// # Errors
-/// [`EstimateError::Singular`].
-pub fn simplify(
-    best: &mut Candidate,
-    tried: &mut Vec<Choice>,
-    observations: &Observations,
-) -> Result<(), EstimateError> {
+pub fn simplify(best: &mut Candidate, tried: &mut Vec<Choice>, observations: &Observations) {
     for camera_idx in 0..best.fit.model.cameras.len() {
         if best.fit.model.cameras[camera_idx].field.offset.is_some() {
             take_if_better(
@@ -112,7 +100,7 @@ pub fn simplify(
                 -NEEDED_GAIN,
                 observations,
                 |model| model.cameras[camera_idx].field.offset = None,
-            )?;
+            );
         }
     }
     if best
@@ -133,9 +121,8 @@ pub fn simplify(
                     camera.field.direction.spline = None;
                 }
             },
-        )?;
+        );
     }
-    Ok(())
 }
 
 fn take_if_better(
@@ -145,15 +132,24 @@ fn take_if_better(
     needed: f64,
     observations: &Observations,
     change: impl FnOnce(&mut Model),
-) -> Result<bool, EstimateError> {
-    let candidate = Candidate::settle(best.fit.changed(observations, change), observations)?;
+) -> bool {
+    // A model that the data leave open has no evidence for it; the one so far stands.
+    let Ok(candidate) = Candidate::settle(best.fit.changed(observations, change), observations)
+    else {
+        tried.push(Choice {
+            what,
+            gain: f64::NEG_INFINITY,
+            taken: false,
+        });
+        return false;
+    };
     let gain = candidate.evidence - best.evidence;
     let taken = gain > needed;
     tried.push(Choice { what, gain, taken });
     if taken {
         *best = candidate;
     }
-    Ok(taken)
+    taken
 }
 
 fn add_offsets(model: &mut Model) {

@@ -11,11 +11,13 @@ mod budget;
 mod encode;
 mod field_rows;
 mod grid;
+mod nearest;
 mod proof;
 mod self_test;
 
 pub use aligned_bytes::{AlignedBytes, read_aligned};
 pub use grid::ControlGrid;
+pub use nearest::pack_nearest;
 pub use proof::Proof;
 
 use crate::field::Rig;

@@ -135,9 +135,9 @@ fn held_out_record(held_out: &HeldOut) -> Option<HeldOutRecord> {
         folds: held_out.folds,
         rms_px: rms(&lengths),
         median_px: lengths.get(lengths.len() / 2).copied(),
-        neighbor_rms_percent: rms(&held_out.neighbor_errors).map(|e| 100.0 * e),
-        rigid_rms_mm: rms(&held_out.rigid_errors_mm),
-        point_count: held_out.rigid_errors_mm.len(),
+        neighbor_rms_percent: rms(&held_out.boards.neighbor_errors).map(|e| 100.0 * e),
+        rigid_rms_mm: rms(&held_out.boards.rigid_errors_mm),
+        point_count: held_out.boards.point_count,
         outside_count: held_out.outside_count,
     })
 }

@@ -1,5 +1,6 @@
 //! What the tests that drive the real binary share: running it, and inputs for it.
 
+#![allow(clippy::format_push_string, reason = "shorter than write! in a test")]
 #![allow(dead_code, reason = "each test file uses its part")]
 
 use calib_offline::board::BoardSpec;
