@@ -123,7 +123,7 @@ fn mirrored(dataset: &Dataset, views: &[View]) -> Option<LabelSuspicion> {
 
 /// Whether columns and rows turn as u and v do; `None` if the corners do not say. The sign of the
 /// determinant of the best affine map from (col, row) to (u, v).
-fn turns_like_image(corners: &[Corner]) -> Option<bool> {
+pub fn turns_like_image(corners: &[Corner]) -> Option<bool> {
     let count = corners.len() as f64;
     let mean = |of: fn(&Corner) -> f64| corners.iter().map(of).sum::<f64>() / count;
     let (mx, my) = (mean(|c| c.col as f64), mean(|c| c.row as f64));
