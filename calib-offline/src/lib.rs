@@ -1,4 +1,4 @@
-//! Camera calibration with one ray per pixel, from a chessboard on a rotation stage.
+#![doc = include_str!("../README.md")]
 
 pub mod adjust;
 pub mod atomic_file;

@@ -8,8 +8,10 @@ mod summary;
 use crate::adjust::Observations;
 use crate::dataset::corners::load_corners;
 use crate::dataset::split::without_excluded;
-use crate::dataset::sufficiency::check_sufficiency;
+use crate::dataset::sufficiency::{SufficiencyError, check_sufficiency};
 use crate::dataset::{Dataset, View};
+use crate::detect::suspicion::suspicious_labels;
+use crate::detect::verdict::Outcome;
 use crate::detect::{self, DetectSettings};
 use crate::error::{Error, UsageError};
 use crate::evaluate::verdict::Thresholds;
@@ -136,17 +138,27 @@ pub fn calibrate_corners(
             method: settings.method.name(),
         }));
     }
+    check_excluded(dataset, &corners.views)?;
     let selection = without_excluded(corners.views.clone(), &dataset.excluded_poses);
-    check_sufficiency(dataset, &selection.used)?;
+    check_sufficiency(dataset, &selection.used)
+        .map_err(|error| with_refusals(dataset, error, corners.detection.as_ref()))?;
+    // Labels that contradict each other are looked for only where they would explain a failure.
+    let explained = |error: Error| match suspicious_labels(dataset, &selection.used) {
+        Some(suspicion) => Error::Labels {
+            suspicion,
+            source: Box::new(error),
+        },
+        None => error,
+    };
     let sensors = dataset.cameras.iter().map(|camera| camera.sensor).collect();
     let observations = Observations::new(dataset.board, sensors, &selection.used);
 
     progress.begin("initialize", 1);
-    let start = start_rig(&observations)?;
+    let start = start_rig(&observations).map_err(|error| explained(error.into()))?;
     progress.end();
 
     progress.begin("estimate", 1);
-    let estimate = estimate(&observations, &start)?;
+    let estimate = estimate(&observations, &start).map_err(|error| explained(error.into()))?;
     progress.end();
 
     let folds = if observations.poses.len() >= 2 * crate::dataset::sufficiency::MIN_POSES {
@@ -166,4 +178,39 @@ pub fn calibrate_corners(
         thresholds: &settings.thresholds,
     });
     Ok(Checked { calibration, folds })
+}
+
+/// Every pose that is left out must be one: a slip in a number would leave the bad pose in.
+fn check_excluded(dataset: &Dataset, views: &[View]) -> Result<(), UsageError> {
+    let last_seen = views.iter().map(|view| view.pose).max();
+    let last_image = dataset.image_pose_count().checked_sub(1);
+    let last = last_seen.max(last_image).unwrap_or(0);
+    match dataset.excluded_poses.iter().find(|pose| **pose > last) {
+        Some(&pose) => Err(UsageError::NoSuchPose { pose, last }),
+        None => Ok(()),
+    }
+}
+
+/// Too few corners, with the reason for which images were refused.
+fn with_refusals(
+    dataset: &Dataset,
+    source: SufficiencyError,
+    detection: Option<&detect::Detection>,
+) -> Error {
+    let images = detection.map_or(&[][..], |detection| &detection.images);
+    let mut refused = images.iter().filter_map(|image| match &image.outcome {
+        Outcome::Refused(reason) => Some((image, reason)),
+        Outcome::Used { .. } => None,
+    });
+    let Some((image, reason)) = refused.next() else {
+        return Error::Sufficiency(source);
+    };
+    let path = image.path.strip_prefix(&dataset.folder);
+    let path = path.unwrap_or(&image.path);
+    Error::FewImages {
+        first: format!("{}: {reason}", path.display()),
+        refused: 1 + refused.count(),
+        total: images.len(),
+        source,
+    }
 }

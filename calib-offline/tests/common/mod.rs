@@ -123,6 +123,7 @@ pub fn rig() -> Rig {
         ),
     });
     Rig {
+        uncertainty: Vec::new(),
         cameras: cameras.into(),
         datum_pose: 0,
     }
