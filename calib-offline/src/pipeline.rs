@@ -1,7 +1,8 @@
 //! The procedure from top to bottom, one call per step: the file to read first.
 //!
-//! A dataset's corners become observations; initialization finds lenses and poses; the joint
-//! estimate adjusts everything; held-out boards judge it; the record says all of it.
+//! A dataset's corners become observations; initialization finds lenses and poses, and the views
+//! that cannot be what they claim; the joint estimate adjusts everything and looks at the views
+//! once more; held-out boards judge it; the record says all of it.
 
 mod summary;
 
@@ -15,7 +16,7 @@ use crate::error::{Error, UsageError};
 use crate::evaluate::held_out::{HeldOut, held_out};
 use crate::evaluate::verdict::Thresholds;
 use crate::init::rig::start_rig;
-use crate::joint::estimate;
+use crate::joint::estimate_screened;
 use crate::progress::Progress;
 use crate::report::Calibration;
 use clap::ValueEnum;
@@ -136,12 +137,12 @@ pub fn calibrate_corners(
     progress.end();
 
     progress.begin("estimate", 1);
-    let estimate = estimate(&observations, &start)?;
+    let (estimate, findings) = estimate_screened(&observations, start)?;
     progress.end();
 
-    let unseen = if observations.poses.len() >= 2 * crate::dataset::sufficiency::MIN_POSES {
+    let unseen = if estimate.pose_count() >= 2 * crate::dataset::sufficiency::MIN_POSES {
         progress.begin("check on held-out poses", settings.folds);
-        let unseen = held_out(&observations, settings.folds, progress);
+        let unseen = held_out(&estimate.observations, settings.folds, progress);
         progress.end();
         unseen
     } else {
@@ -152,6 +153,7 @@ pub fn calibrate_corners(
         corners,
         observations: &observations,
         estimate: &estimate,
+        findings: &findings,
         held_out: &unseen,
         thresholds: &settings.thresholds,
     }))

@@ -71,7 +71,7 @@ fn evaluate_fold(observations: &Observations, folds: usize, fold: usize) -> Opti
     let training = observations.with_poses(|pose| !in_fold(pose));
     let unseen = observations.with_poses(in_fold);
     let start = start_rig(&training).ok()?;
-    let estimate = estimate(&training, &start).ok()?;
+    let estimate = estimate(&start.observations, &start).ok()?;
     Some(measure(&estimate, &unseen))
 }
 

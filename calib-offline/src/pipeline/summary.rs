@@ -9,9 +9,11 @@ use crate::detect::verdict::Outcome;
 use crate::evaluate::HeldOut;
 use crate::evaluate::fit_stage_axes;
 use crate::evaluate::verdict::{Figures, Thresholds, judge};
+use crate::init::screening::{Finding, FindingKind};
 use crate::joint::Estimate;
 use crate::report::record::{
-    Calibration, CornerRecord, EstimateRecord, HeldOutRecord, LeftOut, PoseRecord, SCHEMA,
+    Calibration, CornerRecord, EstimateRecord, HeldOutRecord, LeftOut, PoseRecord, Renumbered,
+    SCHEMA,
     StageAxis,
 };
 use nalgebra::Vector2;
@@ -26,6 +28,8 @@ pub struct Parts<'a> {
     pub observations: &'a Observations,
     /// What it made of it.
     pub estimate: &'a Estimate,
+    /// What was found wrong with views.
+    pub findings: &'a [Finding],
     /// The check on unseen boards.
     pub held_out: &'a HeldOut,
     /// What counts as good.
@@ -53,7 +57,7 @@ pub fn record(parts: &Parts) -> Calibration {
             held_out_rms_px: held_out.as_ref().and_then(|h| h.rms_px),
             neighbor_rms_percent: held_out.as_ref().and_then(|h| h.neighbor_rms_percent),
             corners: (summary.corners_used, summary.corners_rejected),
-            pose_count: estimate.observations.poses.len(),
+            pose_count: estimate.pose_count(),
             covered_share: rig
                 .cameras
                 .iter()
@@ -78,6 +82,7 @@ pub fn record(parts: &Parts) -> Calibration {
         rig,
         corners,
         left_out: left_out(parts, &names),
+        renumbered: renumbered(parts.findings, &names),
         estimate: summary,
         held_out,
         verdict,
@@ -236,6 +241,7 @@ fn left_out(parts: &Parts, names: &[String]) -> Vec<LeftOut> {
             });
         }
     }
+    list.extend(parts.findings.iter().filter_map(|f| screened_out(f, names)));
     for image in parts.corners.detection.iter().flat_map(|d| &d.images) {
         if let Outcome::Refused(refusal) = &image.outcome {
             list.push(LeftOut {
@@ -247,6 +253,62 @@ fn left_out(parts: &Parts, names: &[String]) -> Vec<LeftOut> {
         }
     }
     list
+}
+
+/// What the screening left out; `None` for a view that is used as it should be.
+fn screened_out(finding: &Finding, names: &[String]) -> Option<LeftOut> {
+    let (corner_count, reason) = match &finding.kind {
+        FindingKind::Misfit {
+            median_px,
+            typical_px,
+        } => (
+            finding.corner_count,
+            format!(
+                "the whole view misses by {median_px:.2} px (median; {typical_px:.2} px in other \
+                 views): the board moved during the exposure, is bent, or is another one"
+            ),
+        ),
+        FindingKind::Unsynchronized {
+            other_camera_idx,
+            misfit_px,
+            typical_px,
+        } => (
+            0,
+            format!(
+                "not the same board position as in camera {} ({misfit_px:.2} px apart, other pairs \
+                 {typical_px:.2} px): not exposed at the same instant; left out as a pair, each \
+                 view used for its own camera",
+                names[*other_camera_idx]
+            ),
+        ),
+        FindingKind::Renumbered { .. } => return None,
+    };
+    Some(LeftOut {
+        pose: finding.pose,
+        camera: Some(names[finding.camera_idx].clone()),
+        corner_count,
+        reason,
+    })
+}
+
+fn renumbered(findings: &[Finding], names: &[String]) -> Vec<Renumbered> {
+    findings
+        .iter()
+        .filter_map(|finding| match &finding.kind {
+            FindingKind::Renumbered {
+                other_camera_idx, ..
+            } => Some(Renumbered {
+                pose: finding.pose,
+                camera: names[finding.camera_idx].clone(),
+                reason: format!(
+                    "numbered from the other end of the board than in camera {}; renumbered, and \
+                     used",
+                    names[*other_camera_idx]
+                ),
+            }),
+            _ => None,
+        })
+        .collect()
 }
 
 /// Root mean square; `None` of nothing.

@@ -102,6 +102,7 @@ pub fn calibration() -> Calibration {
         poses,
         corners,
         left_out: left_out(),
+        renumbered: Vec::new(),
         held_out: Some(held_out()),
         verdict: Verdict {
             grade: Grade::Doubtful,

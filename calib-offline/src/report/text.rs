@@ -72,6 +72,10 @@ pub fn summary(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
             ),
         ));
     }
+    for view in &calibration.renumbered {
+        let text = format!("pose {}, {}: {}", view.pose, view.camera, view.reason);
+        lines.push(("renumbered", text));
+    }
     if let Some(blob) = blob {
         lines.push(("blob", blob.in_words()));
     }
