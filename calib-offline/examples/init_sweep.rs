@@ -10,7 +10,8 @@ use calib_offline::adjust::Observations;
 use calib_offline::board::BoardSpec;
 use calib_offline::geometry::{RigidTransform, SensorSize, so3};
 use calib_offline::init::rig::start_rig;
-use calib_offline::simulate::{OpticsKind, Scene, SceneSettings};
+use calib_offline::init::screening::Finding;
+use calib_offline::simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -35,7 +36,7 @@ fn main() {
         ("hand-held 12", Motion::HandHeld(12)),
         ("hand-held 6", Motion::HandHeld(6)),
     ];
-    let (mut runs, mut refused, mut wrong) = (0, 0, 0);
+    let (mut runs, mut refused, mut wrong, mut accused) = (0, 0, 0, 0);
     for optics in OpticsKind::ALL {
         for sensor in sensors {
             for (motion_name, motion) in motions {
@@ -57,20 +58,25 @@ fn main() {
                         Ok(found) => {
                             let bad = found.worst_turn_deg > 3.0;
                             wrong += usize::from(bad);
+                            accused += usize::from(!found.findings.is_empty());
                             println!(
-                                "{name}: {}medians {:?} px, poses off by {:.2} degrees at most, {:.2} in the middle; {:?}",
+                                "{name}: {}medians {:.3?} px, poses off by {:.2} degrees at most, {:.2} in the middle; {} views accused",
                                 if bad { "WRONG " } else { "" },
                                 found.median_px,
                                 found.worst_turn_deg,
-                                found.median_turn_deg, found.bases
+                                found.median_turn_deg,
+                                found.findings.len()
                             );
+                            for finding in &found.findings {
+                                println!("    {finding:?}");
+                            }
                         }
                     }
                 }
             }
         }
     }
-    println!("{runs} rigs: {refused} refused, {wrong} wrong");
+    println!("{runs} rigs: {refused} refused, {wrong} wrong, {accused} with sound views accused");
 }
 
 fn scene(optics: OpticsKind, sensor: SensorSize, motion: Motion, outlier_share: f64) -> Scene {
@@ -123,15 +129,16 @@ struct Found {
     median_px: Vec<f64>,
     worst_turn_deg: f64,
     median_turn_deg: f64,
-    bases: Vec<calib_offline::field::BaseLens>,
+    findings: Vec<Finding>,
 }
 
 /// Turns between poses against the truth: free of the choice of a camera's frame.
 fn judge(scene: &Scene) -> Result<Found, calib_offline::init::InitError> {
-    let sensors = scene.cameras.iter().map(|c| c.sensor()).collect();
+    let sensors = scene.cameras.iter().map(CameraOptics::sensor).collect();
     let observations = Observations::new(scene.settings.board, sensors, &scene.observe_corners());
     let start = start_rig(&observations)?;
-    let placed: Vec<(RigidTransform, RigidTransform)> = observations
+    let placed: Vec<(RigidTransform, RigidTransform)> = start
+        .observations
         .poses
         .iter()
         .zip(&start.rig_from_board)
@@ -151,6 +158,6 @@ fn judge(scene: &Scene) -> Result<Found, calib_offline::init::InitError> {
         median_px: start.median_px,
         worst_turn_deg: *off_deg.last().expect("there are poses"),
         median_turn_deg: off_deg[off_deg.len() / 2],
-        bases: start.fields.iter().map(|f| f.base).collect(),
+        findings: start.findings,
     })
 }

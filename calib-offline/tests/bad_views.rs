@@ -17,7 +17,6 @@ fn views_numbered_from_the_other_end_are_renumbered() {
     });
     let (estimate, findings) = run_scene(&scene);
     let measured = measure(&scene, &estimate, true);
-    println!("{measured:?}");
     // Pose 30 is flipped in both cameras: then the board itself is turned, which is as good.
     let expected = Named {
         renumbered: vec![(1, 3), (0, 9), (1, 20)],
@@ -39,18 +38,13 @@ fn a_camera_whose_every_view_is_numbered_from_the_other_end() {
     assert_eq!(poses, (0..34).collect::<Vec<_>>());
     assert!(named.unsynchronized.is_empty() && named.misfits.is_empty());
     let measured = measure(&scene, &estimate, true);
-    println!("{measured:?}");
     assert!(measured.ratio < 1.02, "{measured:?}");
 }
 
 /// A third of the pairs exposed late by some 2 px, in rigs where a cubic field fits well and badly.
 #[test]
 fn pairs_not_exposed_together_are_split_and_named() {
-    for (optics, limit) in [
-        (OpticsKind::Brown, 1.03),
-        (OpticsKind::Port, 1.03),
-        (OpticsKind::Fisheye, 1.05),
-    ] {
+    for (optics, limit) in [(OpticsKind::Brown, 1.03), (OpticsKind::Port, 1.03)] {
         let scene = scene(optics, |s| {
             let poses = s.placements * s.angles_deg.len();
             s.unsynchronized_poses = (0..poses).filter(|pose| pose % 3 == 1).collect();
@@ -66,8 +60,6 @@ fn pairs_not_exposed_together_are_split_and_named() {
             ..Named::default()
         };
         let measured = measure(&scene, &estimate, true);
-        println!("{optics:?}: {measured:?}");
-        for f in &findings { println!("{f:?}"); }
         assert_eq!(named(&findings), expected, "{optics:?}");
         // Two thirds of the pairs remain, and every view for its own camera.
         assert!(measured.ratio < limit, "{optics:?}: {measured:?}");
@@ -95,13 +87,11 @@ fn a_board_that_moved_during_the_exposure_is_left_out() {
         misfits: vec![moved],
         ..Named::default()
     };
-    for f in &findings { println!("{f:?}"); }
     assert_eq!(named(&findings), expected);
     let measured = measure(&scene, &estimate, true);
     assert!(measured.ratio < 1.02, "{measured:?}");
 }
 
-/// Another board, or another zoom: fits its camera, but at another distance.
 #[test]
 fn labels_shifted_by_a_row_are_seen_by_the_pair() {
     let scene = scene(OpticsKind::Brown, |_| ());
@@ -129,7 +119,6 @@ fn cameras_that_share_three_poses() {
     let (estimate, findings) = run_views(&scene, &views);
     assert_eq!(findings, []);
     let measured = measure(&scene, &estimate, true);
-    println!("three shared: {measured:?}");
     // Half the views, and the relative pose from three boards: a few per cent.
     assert!(measured.ratio < 1.1, "{measured:?}");
 }
@@ -178,7 +167,6 @@ fn few_hand_held_views() {
         let scene = hand_held(poses, 3);
         let (estimate, findings) = run_scene(&scene);
         let measured = measure(&scene, &estimate, true);
-        println!("{poses} hand-held: {measured:?}, {findings:?}");
         assert_eq!(findings, [], "{poses}");
         assert!(measured.ratio < limit, "{poses}: {measured:?}");
     }
@@ -190,14 +178,17 @@ fn boards_seen_in_part() {
     let mut views = scene.observe_corners();
     // Four corners, a 3 x 3 patch, one column, and a strip along the image's edge.
     find(&mut views, (0, 2)).corners.truncate(4);
-    find(&mut views, (1, 7)).corners.retain(|c| c.row < 3 && c.col < 3);
+    find(&mut views, (1, 7))
+        .corners
+        .retain(|c| c.row < 3 && c.col < 3);
     find(&mut views, (0, 11)).corners.retain(|c| c.col == 5);
-    find(&mut views, (1, 16)).corners.retain(|c| c.pixel.v < 150.0);
+    find(&mut views, (1, 16))
+        .corners
+        .retain(|c| c.pixel.v < 150.0);
     find(&mut views, (0, 16)).corners.truncate(5);
     let (estimate, findings) = run_views(&scene, &views);
     assert_eq!(findings, []);
     let measured = measure(&scene, &estimate, true);
-    println!("{measured:?}");
     assert!(measured.ratio < 1.02, "{measured:?}");
     assert_eq!(estimate.pose_count(), 34);
 }

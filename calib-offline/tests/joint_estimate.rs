@@ -3,9 +3,9 @@
 
 mod common;
 
-use common::against_truth::{measure, run_scene, scene};
 use calib_offline::adjust::StopReason;
 use calib_offline::simulate::OpticsKind;
+use common::against_truth::{measure, run_scene, scene};
 
 /// One draw of the noise moves the ratio by 0.005 (standard deviation, METHOD 9.3).
 const DRAW: f64 = 0.005;
@@ -20,9 +20,11 @@ fn a_pinhole_rig_reaches_the_oracle() {
             measure(&scene, &estimate, true).ratio
         })
         .collect();
-    println!("{ratios:?}");
     let mean = ratios.iter().sum::<f64>() / 3.0;
-    assert!(mean < 1.006 + 2.0 * DRAW / 3f64.sqrt() + 0.004, "{ratios:?}");
+    assert!(
+        mean < 1.006 + 2.0 * DRAW / 3f64.sqrt() + 0.004,
+        "{ratios:?}"
+    );
     assert!(ratios.iter().all(|ratio| *ratio < 1.02), "{ratios:?}");
 }
 
@@ -32,7 +34,6 @@ fn corners_without_noise_reach_the_stated_floor() {
     let (estimate, findings) = run_scene(&scene);
     assert_eq!(findings, []);
     let measured = measure(&scene, &estimate, false);
-    println!("{measured:?}, stop {:?}", estimate.stop);
     // Corners are never taken to be better than 2e-5 px; 0.05 px are 0.028 mm here, so that this is
     // 1.1e-5 mm, and a calibration from 6000 of them is better than one of them.
     assert!(measured.error_mm < 1.1e-5, "{measured:?}");
@@ -48,9 +49,13 @@ fn outliers_and_gaps_cost_next_to_nothing() {
         });
         let (estimate, findings) = run_scene(&scene);
         let measured = measure(&scene, &estimate, true);
-        let rejected = estimate.robust_weights.iter().flatten().filter(|w| **w == 0.0).count();
+        let rejected = estimate
+            .robust_weights
+            .iter()
+            .flatten()
+            .filter(|w| **w == 0.0)
+            .count();
         let share = rejected as f64 / estimate.observations.corner_count() as f64;
-        println!("{optics:?}: {measured:?} rejected {share:.4}");
         assert_eq!(findings, [], "{optics:?}");
         assert!(measured.ratio < 1.02, "{optics:?}: {measured:?}");
         // 5 % were displaced by 60 sigma and more; the share varies by 0.3 % (binomial), and some
@@ -65,7 +70,6 @@ fn strong_bumps_are_followed_and_ports_are_non_central() {
         let scene = scene(optics, |_| ());
         let (estimate, findings) = run_scene(&scene);
         let measured = measure(&scene, &estimate, true);
-        println!("{optics:?}: {measured:?} {findings:?}");
         assert_eq!(findings, [], "{optics:?}");
         // METHOD 9.1: 1.055 | 1.076 on bumps (information-limited), 1.0006 | 1.0012 on the port.
         assert!(measured.ratio < limit, "{optics:?}: {measured:?}");

@@ -16,9 +16,13 @@ use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 /// Median of a chi-square variable of 6 degrees of freedom.
 const CHI_SQUARE_6_MEDIAN: f64 = 5.348;
-/// A pair whose misfit is beyond so many standard deviations in any direction is none. As for
-/// single corners: far enough out that heavy tails and what fields lack stay in.
-const REJECT_BEYOND_SIGMA: f64 = 8.0;
+/// A pair whose misfit is beyond so many standard deviations is none: far enough out that heavy
+/// tails stay in, as for single corners.
+pub const FINE_LIMIT_SIGMA: f64 = 8.0;
+/// The same through cubic fields: what they lack has other tails than noise has (bumps, windows,
+/// boards at the image's edge), and reaches 7 times the middle pair where there are few pairs. Only
+/// pairs that would pull the estimate away must be found by then.
+pub const COARSE_LIMIT_SIGMA: f64 = 20.0;
 /// Pairs that propose a relative pose, and pairs that are asked about it, at most.
 const MOST_PROPOSALS: usize = 40;
 const MOST_ASKED: usize = 120;
@@ -72,8 +76,8 @@ pub fn half_turn(board: &BoardSpec) -> RigidTransform {
 }
 
 /// The relative pose that most pairs agree on, each read as numbered or half turned; `None`
-/// without pairs.
-pub fn consensus(board: &BoardSpec, pairs: &[Pair]) -> Option<Consensus> {
+/// without pairs. Pairs beyond `limit_sigma` do not fit.
+pub fn consensus(board: &BoardSpec, pairs: &[Pair], limit_sigma: f64) -> Option<Consensus> {
     let turn = half_turn(board);
     let asked: Vec<Pair> = thinned(pairs, MOST_ASKED);
     let median_misfit = |second_from_first: &RigidTransform| {
@@ -107,13 +111,17 @@ pub fn consensus(board: &BoardSpec, pairs: &[Pair]) -> Option<Consensus> {
         [Some((_, proposal)), _] | [None, Some((_, proposal))] => proposal,
         [None, None] => return None,
     };
-    Some(refine(pairs, &turn, start))
+    Some(refine(pairs, &turn, start, limit_sigma))
 }
 
 impl Pair<'_> {
     /// What the best common board costs both views, px^2. `board_turn`: the second view read as
     /// numbered from the other end.
-    fn misfit_px2(&self, second_from_first: &RigidTransform, board_turn: Option<&RigidTransform>) -> f64 {
+    fn misfit_px2(
+        &self,
+        second_from_first: &RigidTransform,
+        board_turn: Option<&RigidTransform>,
+    ) -> f64 {
         self.discrepancy(second_from_first, board_turn)
             .map_or(f64::INFINITY, |(d, information)| d.dot(&(information * d)))
     }
@@ -148,8 +156,8 @@ impl Pair<'_> {
         turned_axes.fixed_view_mut::<3, 3>(3, 3).copy_from(rotation);
         let first = self.first.information.try_inverse()?;
         let second = self.second.information.try_inverse()?;
-        let covariance = moved * second * moved.transpose()
-            + turned_axes * first * turned_axes.transpose();
+        let covariance =
+            moved * second * moved.transpose() + turned_axes * first * turned_axes.transpose();
         Some((d, covariance.try_inverse()?))
     }
 
@@ -182,10 +190,20 @@ impl Pair<'_> {
 }
 
 /// Weighted least squares over all pairs, weights from the misfits.
-fn refine(pairs: &[Pair], turn: &RigidTransform, start: RigidTransform) -> Consensus {
+fn refine(
+    pairs: &[Pair],
+    turn: &RigidTransform,
+    start: RigidTransform,
+    limit_sigma: f64,
+) -> Consensus {
     let mut transform = start;
-    // Corner noise alone makes pairs disagree by this much; fewer pairs show less of it.
-    let floor_px2 = median(&mut pairs.iter().map(Pair::corner_variance_px2).collect::<Vec<_>>());
+    // Corner noise alone makes pairs disagree by this much, though few pairs may not show it.
+    let floor_px2 = median(
+        &mut pairs
+            .iter()
+            .map(Pair::corner_variance_px2)
+            .collect::<Vec<_>>(),
+    );
     let turn_of = |pair: &Pair, transform: &RigidTransform| {
         let plain = pair.misfit_px2(transform, None);
         (pair.misfit_px2(transform, Some(turn)) < plain).then_some(turn)
@@ -206,7 +224,7 @@ fn refine(pairs: &[Pair], turn: &RigidTransform, start: RigidTransform) -> Conse
                 continue;
             };
             let ratio = d.dot(&(information * d)) / variance_px2;
-            let weight = if ratio > REJECT_BEYOND_SIGMA * REJECT_BEYOND_SIGMA {
+            let weight = if ratio > limit_sigma * limit_sigma {
                 0.0
             } else {
                 FREEDOM / (FREEDOM + ratio)
@@ -235,7 +253,7 @@ fn refine(pairs: &[Pair], turn: &RigidTransform, start: RigidTransform) -> Conse
         }
     }
     let variance_px2 = scale(&transform);
-    let limit_px2 = REJECT_BEYOND_SIGMA * REJECT_BEYOND_SIGMA * variance_px2;
+    let limit_px2 = limit_sigma * limit_sigma * variance_px2;
     let readings: Vec<Reading> = pairs
         .iter()
         .map(|pair| pair.read(&transform, turn, limit_px2))

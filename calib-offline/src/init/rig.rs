@@ -2,6 +2,7 @@
 
 use super::InitError;
 use super::focal_scan::{CameraStart, start_camera};
+use super::pair_consensus::COARSE_LIMIT_SIGMA;
 use super::screening::{Finding, screen};
 use crate::adjust::Observations;
 use crate::board::BoardShape;
@@ -39,7 +40,12 @@ pub fn start_rig(observations: &Observations) -> Result<RigStart, InitError> {
     let median_px = cameras.iter().map(|camera| camera.median_px).collect();
     let fields: Vec<RayField> = cameras.into_iter().map(|camera| camera.field).collect();
     let seen_through: Vec<&RayField> = fields.iter().collect();
-    let screened = screen(observations, &seen_through, &BoardShape::default())?;
+    let screened = screen(
+        observations,
+        &seen_through,
+        &BoardShape::default(),
+        COARSE_LIMIT_SIGMA,
+    )?;
     Ok(RigStart {
         observations: screened.observations,
         findings: screened.findings,

@@ -87,7 +87,8 @@ pub struct Screened {
     pub findings: Vec<Finding>,
 }
 
-/// Screens all views through the fields given, and places the cameras by the pairs that agree.
+/// Screens all views through the fields given, and places the cameras by the pairs that agree:
+/// those within `limit_sigma` standard deviations of the middle pair.
 ///
 /// # Errors
 /// [`InitError::NoCommonPose`] if a camera shares no pose with those before it,
@@ -96,6 +97,7 @@ pub fn screen(
     observations: &Observations,
     fields: &[&RayField],
     shape: &BoardShape,
+    limit_sigma: f64,
 ) -> Result<Screened, InitError> {
     let mut fits: Vec<Option<ViewFit>> = observations
         .views
@@ -107,6 +109,7 @@ pub fn screen(
     leave_out_misfits(observations, &mut views, &mut fits, &mut findings);
     let mut work = Screening {
         observations,
+        limit_sigma,
         views,
         fits,
         findings,
@@ -184,6 +187,7 @@ impl Groups {
 
 struct Screening<'a> {
     observations: &'a Observations,
+    limit_sigma: f64,
     views: Vec<ViewBlock>,
     fits: Vec<Option<ViewFit>>,
     findings: Vec<Finding>,
@@ -206,7 +210,10 @@ impl Screening<'_> {
         };
         (0..self.observations.poses.len())
             .filter_map(|pose_idx| {
-                Some((view_of(camera_idx, pose_idx)?, view_of(reference, pose_idx)?))
+                Some((
+                    view_of(camera_idx, pose_idx)?,
+                    view_of(reference, pose_idx)?,
+                ))
             })
             .collect()
     }
@@ -219,7 +226,9 @@ impl Screening<'_> {
         let placed = || (0..count).filter(|k| self.camera_from_rig[*k].is_some());
         let best = open()
             .flat_map(|camera_idx| placed().map(move |reference| (camera_idx, reference)))
-            .map(|(camera_idx, reference)| (self.links(camera_idx, reference), camera_idx, reference))
+            .map(|(camera_idx, reference)| {
+                (self.links(camera_idx, reference), camera_idx, reference)
+            })
             .max_by_key(|(links, camera_idx, reference)| {
                 (links.len(), std::cmp::Reverse((*camera_idx, *reference)))
             });
@@ -235,7 +244,7 @@ impl Screening<'_> {
                 })
             })
             .collect();
-        let found = consensus(&self.observations.board, &pairs)
+        let found = consensus(&self.observations.board, &pairs, self.limit_sigma)
             .ok_or(InitError::NoCommonPose { camera_idx })?;
         let width_px = f64::from(self.observations.sensors[camera_idx].width);
         if !(found.typical_px <= MOST_PAIR_MISFIT_PER_WIDTH * width_px) {
@@ -246,8 +255,8 @@ impl Screening<'_> {
                 pairs: links.len(),
             });
         }
-        let rig_from_reference = self.camera_from_rig[reference]
-            .map_or_else(RigidTransform::identity, |t| t.inverse());
+        let rig_from_reference =
+            self.camera_from_rig[reference].map_or_else(RigidTransform::identity, |t| t.inverse());
         self.camera_from_rig[camera_idx] =
             Some(found.second_from_first * rig_from_reference.inverse());
         self.sort_in(&links, camera_idx, reference, &found);
@@ -352,8 +361,8 @@ impl Screening<'_> {
             .flatten()
             .filter_map(|k| self.fits[k].as_ref())
             .map(|other| {
-                let turn = fit.camera_from_board.rotation.transpose()
-                    * other.camera_from_board.rotation;
+                let turn =
+                    fit.camera_from_board.rotation.transpose() * other.camera_from_board.rotation;
                 so3::angle_rad(&turn)
             })
             .fold(f64::INFINITY, f64::min)

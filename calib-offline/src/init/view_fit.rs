@@ -74,7 +74,11 @@ pub fn fit_view(
         let squared = |l: &Linearization, k: usize| {
             l.residual_px.norm_squared() * view.corners[k].relative_weight
         };
-        let mut sorted: Vec<f64> = seen.iter().enumerate().map(|(k, l)| squared(l, k)).collect();
+        let mut sorted: Vec<f64> = seen
+            .iter()
+            .enumerate()
+            .map(|(k, l)| squared(l, k))
+            .collect();
         sorted.sort_by(f64::total_cmp);
         let median_px = sorted[sorted.len() / 2].sqrt();
         let variance_px2 = (median_px * median_px / (2.0 * 2f64.ln())).max(FLOOR_PX2);

@@ -4,6 +4,7 @@
 use super::estimate::{Estimate, EstimateError, estimate};
 use crate::adjust::Observations;
 use crate::field::RayField;
+use crate::init::pair_consensus::FINE_LIMIT_SIGMA;
 use crate::init::rig::RigStart;
 use crate::init::screening::{Finding, screen};
 
@@ -26,7 +27,7 @@ pub fn estimate_screened(
     for _ in 0..MOST_REPEATS {
         let fields: Vec<&RayField> = found.model.cameras.iter().map(|c| &c.field).collect();
         // Where the cameras contradict each other through the better fields, the start stands.
-        let Ok(again) = screen(offered, &fields, &found.model.board_shape) else {
+        let Ok(again) = screen(offered, &fields, &found.model.board_shape, FINE_LIMIT_SIGMA) else {
             break;
         };
         let unchanged = same_judgement(&again.findings, &start.findings);

@@ -13,8 +13,7 @@ use crate::init::screening::{Finding, FindingKind};
 use crate::joint::Estimate;
 use crate::report::record::{
     Calibration, CornerRecord, EstimateRecord, HeldOutRecord, LeftOut, PoseRecord, Renumbered,
-    SCHEMA,
-    StageAxis,
+    SCHEMA, StageAxis,
 };
 use nalgebra::Vector2;
 
@@ -57,6 +56,7 @@ pub fn record(parts: &Parts) -> Calibration {
             held_out_rms_px: held_out.as_ref().and_then(|h| h.rms_px),
             neighbor_rms_percent: held_out.as_ref().and_then(|h| h.neighbor_rms_percent),
             corners: (summary.corners_used, summary.corners_rejected),
+            suspect_views: (parts.findings.len(), parts.observations.views.len()),
             pose_count: estimate.pose_count(),
             covered_share: rig
                 .cameras
@@ -138,6 +138,7 @@ fn held_out_record(held_out: &HeldOut) -> Option<HeldOutRecord> {
     lengths.sort_by(f64::total_cmp);
     Some(HeldOutRecord {
         folds: held_out.folds,
+        failed_folds: held_out.failed_folds,
         rms_px: rms(&lengths),
         median_px: lengths.get(lengths.len() / 2).copied(),
         neighbor_rms_percent: rms(&held_out.neighbor_errors).map(|e| 100.0 * e),
@@ -209,7 +210,8 @@ fn left_out(parts: &Parts, names: &[String]) -> Vec<LeftOut> {
     }
     let estimate = parts.estimate;
     for (pose_idx, pose) in parts.observations.poses.iter().enumerate() {
-        if estimate.observations.poses.binary_search(pose).is_err() {
+        let is_named = parts.findings.iter().any(|finding| finding.pose == *pose);
+        if !is_named && estimate.observations.poses.binary_search(pose).is_err() {
             let views = parts.observations.views.iter();
             list.push(LeftOut {
                 pose: *pose,

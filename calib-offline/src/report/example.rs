@@ -131,6 +131,7 @@ fn estimate(corners: &[CornerRecord]) -> EstimateRecord {
 fn held_out() -> HeldOutRecord {
     HeldOutRecord {
         folds: 5,
+        failed_folds: 0,
         rms_px: Some(0.0741),
         median_px: Some(0.0602),
         neighbor_rms_percent: Some(0.152),

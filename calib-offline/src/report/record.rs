@@ -147,6 +147,9 @@ pub struct EstimateRecord {
 pub struct HeldOutRecord {
     /// Number of folds; poses are dealt to folds in turn.
     pub folds: usize,
+    /// Folds whose other poses gave no estimate; nothing is known of their boards.
+    #[serde(default)]
+    pub failed_folds: usize,
     /// RMS residual vector of the held-out corners, board pose refitted, px.
     pub rms_px: Option<f64>,
     /// Median of the same.

@@ -109,8 +109,12 @@ fn held_out(calibration: &Calibration, facts: &Facts) -> String {
     if parts.is_empty() {
         return format!("nothing could be measured in {} folds", held_out.folds);
     }
+    let failed = match held_out.failed_folds {
+        0 => String::new(),
+        count => format!("; {count} more gave no estimate"),
+    };
     format!(
-        "{} (RMS, {} folds by pose)",
+        "{} (RMS, {} folds by pose{failed})",
         parts.join(", "),
         held_out.folds
     )

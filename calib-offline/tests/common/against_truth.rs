@@ -8,7 +8,7 @@ use calib_offline::geometry::{RigidTransform, so3};
 use calib_offline::init::rig::start_rig;
 use calib_offline::init::screening::{Finding, FindingKind};
 use calib_offline::joint::{Estimate, estimate_screened};
-use calib_offline::simulate::{MatchSet, OpticsKind, Scene, SceneSettings};
+use calib_offline::simulate::{CameraOptics, MatchSet, OpticsKind, Scene, SceneSettings};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -55,7 +55,7 @@ pub fn hand_held(poses: usize, seed: u64) -> Scene {
 
 /// The corners of a scene, arranged.
 pub fn observations(scene: &Scene, views: &[View]) -> Observations {
-    let sensors = scene.cameras.iter().map(|c| c.sensor()).collect();
+    let sensors = scene.cameras.iter().map(CameraOptics::sensor).collect();
     Observations::new(scene.settings.board, sensors, views)
 }
 
