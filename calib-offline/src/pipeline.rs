@@ -1,7 +1,8 @@
 //! The procedure from top to bottom, one call per step: the file to read first.
 //!
-//! A dataset's corners become observations; initialization finds lenses and poses; the joint
-//! estimate adjusts everything; held-out boards judge it; the record says all of it.
+//! A dataset's corners become observations; initialization finds lenses and poses, and the views
+//! that cannot be what they claim; the joint estimate adjusts everything and looks at the views
+//! once more; held-out boards judge it; the record says all of it.
 
 mod summary;
 
@@ -17,7 +18,7 @@ use crate::error::{Error, UsageError};
 use crate::evaluate::verdict::Thresholds;
 use crate::evaluate::{Folds, estimate_folds, held_out};
 use crate::init::rig::start_rig;
-use crate::joint::estimate;
+use crate::joint::estimate_screened;
 use crate::progress::Progress;
 use crate::report::Calibration;
 use clap::ValueEnum;
@@ -158,12 +159,16 @@ pub fn calibrate_corners(
     progress.end();
 
     progress.begin("estimate", 1);
-    let estimate = estimate(&observations, &start).map_err(|error| explained(error.into()))?;
+    let (mut estimate, findings) =
+        estimate_screened(&observations, start).map_err(|error| explained(error.into()))?;
+    let names: Vec<String> = dataset.cameras.iter().map(|c| c.name.clone()).collect();
+    let mut rig = estimate.rig(&names);
+    estimate.fill_uncertainty(&mut rig)?;
     progress.end();
 
-    let folds = if observations.poses.len() >= 2 * crate::dataset::sufficiency::MIN_POSES {
+    let folds = if estimate.pose_count() >= 2 * crate::dataset::sufficiency::MIN_POSES {
         progress.begin("check on held-out poses", settings.folds);
-        let folds = estimate_folds(&observations, settings.folds, progress);
+        let folds = estimate_folds(&estimate.observations, settings.folds, progress);
         progress.end();
         folds
     } else {
@@ -174,6 +179,8 @@ pub fn calibrate_corners(
         corners,
         observations: &observations,
         estimate: &estimate,
+        rig,
+        findings: &findings,
         held_out: &held_out(&folds),
         thresholds: &settings.thresholds,
     });

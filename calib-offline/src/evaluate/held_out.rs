@@ -111,7 +111,7 @@ fn estimate_fold(observations: &Observations, folds: usize, fold: usize) -> Opti
     let training = observations.with_poses(|pose| !in_fold(pose));
     let start = start_rig(&training).ok()?;
     Some(Fold {
-        estimate: estimate(&training, &start).ok()?,
+        estimate: estimate(&start.observations, &start).ok()?,
         unseen: observations.with_poses(in_fold),
     })
 }

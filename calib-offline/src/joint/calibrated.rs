@@ -30,6 +30,12 @@ impl Estimate {
         }
     }
 
+    /// Number of different poses that went in; one that was split counts once.
+    pub fn pose_count(&self) -> usize {
+        let poses = &self.observations.poses;
+        poses.len() - poses.windows(2).filter(|w| w[0] == w[1]).count()
+    }
+
     /// Per pose of the observations, in the rig's frame.
     pub fn rig_from_board(&self) -> Vec<RigidTransform> {
         let datum = self.datum_from_first_camera();

@@ -66,14 +66,8 @@ pub enum EstimateError {
 /// # Errors
 /// [`EstimateError::Singular`] if the data leave a parameter open.
 pub fn estimate(observations: &Observations, start: &RigStart) -> Result<Estimate, EstimateError> {
-    let placed: Vec<usize> = observations
-        .poses
-        .iter()
-        .zip(&start.rig_from_board)
-        .filter(|(_, pose)| pose.is_some())
-        .map(|(pose, _)| *pose)
-        .collect();
-    let observations = observations.with_poses(|pose| placed.contains(&pose));
+    let observations =
+        observations.with_pose_indices(|pose_idx| start.rig_from_board[pose_idx].is_some());
     let model = starting_model(start);
 
     // What every lens may use, then where its center of distortion is.

@@ -13,6 +13,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+pub mod against_truth;
+
 pub const BOARD: BoardSpec = BoardSpec {
     rows: 6,
     cols: 5,
@@ -163,6 +165,7 @@ pub fn calibration() -> Calibration {
         stage_axes: Vec::new(),
         corners: Vec::new(),
         left_out: Vec::new(),
+        renumbered: Vec::new(),
         estimate: EstimateRecord {
             cost_per_iteration: Vec::new(),
             stop_reason: "it was never begun".to_owned(),
