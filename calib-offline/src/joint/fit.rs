@@ -60,7 +60,7 @@ impl Fit {
         let mut next = self.clone();
         change(&mut next.model);
         next.smoothness.cover(&next.model);
-        next.bases = next.model.view_bases(observations);
+        next.bases = next.model.changed_view_bases(observations, &self.bases);
         next.residuals = normal_equations::residuals(&next.model, observations, &next.bases);
         next
     }
