@@ -223,6 +223,25 @@ pub fn check_folder(path: &Path) -> Result<(), WriteError> {
     }
 }
 
+/// Whether files can be made in `folder`, or in what stands of the folders around it: a long
+/// calculation should not end at a closed door. Nothing is left there.
+///
+/// # Errors
+/// [`WriteError::NotFolder`], [`WriteError::Io`].
+pub fn check_writable(folder: &Path) -> Result<(), WriteError> {
+    check_folder(folder)?;
+    let standing = folder.ancestors().find(|p| p.is_dir());
+    let standing = standing.unwrap_or_else(|| Path::new("."));
+    tempfile::Builder::new()
+        .prefix(".calib-offline-")
+        .tempfile_in(standing)
+        .map(|_| ())
+        .map_err(|source| WriteError::Io {
+            path: folder.to_owned(),
+            source,
+        })
+}
+
 /// Makes a folder and all it lies in, unless it exists.
 ///
 /// # Errors

@@ -2,8 +2,10 @@
 
 use crate::atomic_file::WriteError;
 use crate::dataset::{CornersError, ManifestError, SufficiencyError};
+use crate::demo::DemoError;
 use crate::detect::DetectError;
 use crate::detect::overlay::OverlayError;
+use crate::detect::suspicion::LabelSuspicion;
 use crate::init::InitError;
 use crate::joint::EstimateError;
 use crate::matches::MatchesError;
@@ -34,6 +36,26 @@ pub enum Error {
     /// Corners that no estimate could work with.
     #[error("these corners cannot determine a calibration")]
     Sufficiency(#[from] SufficiencyError),
+    /// Images that show too little of the board.
+    #[error("{refused} of {total} images were refused; the first: {first}")]
+    FewImages {
+        /// Images that were refused.
+        refused: usize,
+        /// Images looked at.
+        total: usize,
+        /// The file and the reason of the first one refused.
+        first: String,
+        /// What is missing.
+        source: SufficiencyError,
+    },
+    /// Labels that contradict each other, found after no estimate was possible.
+    #[error("the corners do not belong together as they are labelled: {suspicion}")]
+    Labels {
+        /// What is suspected.
+        suspicion: LabelSuspicion,
+        /// The failure that it explains.
+        source: Box<Error>,
+    },
     /// No starting point.
     #[error("no camera model explains these corners")]
     Init(#[from] InitError),
@@ -58,6 +80,9 @@ pub enum Error {
     /// A result that was to be written.
     #[error("the result cannot be written")]
     Write(#[from] WriteError),
+    /// A demo that could not measure.
+    #[error("the demo cannot measure")]
+    Demo(#[from] DemoError),
     /// A request that cannot be met.
     #[error("the command cannot be run so")]
     Usage(#[from] UsageError),
@@ -129,6 +154,14 @@ pub enum UsageError {
         /// Its name.
         method: &'static str,
     },
+    /// A pose that the recording does not have.
+    #[error("there is no pose {pose} to leave out; the last is pose {last}")]
+    NoSuchPose {
+        /// The pose asked for.
+        pose: usize,
+        /// The last pose.
+        last: usize,
+    },
     /// The input would be replaced by the output.
     #[error("{}: is what the command reads", path.display())]
     OutputIsInput {
@@ -141,7 +174,7 @@ impl UsageError {
     /// What to do about it.
     pub fn remedy(&self) -> Option<String> {
         let text = match self {
-            Self::Exists { .. } => "choose another place with -o, or replace it with --force",
+            Self::Exists { .. } => "choose another place, or replace it with --force",
             Self::UnknownKind { .. } | Self::NotFound { .. } => "check the path",
             Self::UnknownFrame { .. } => {
                 "leave --frame out for the rig's own frame, or name one of its cameras"
@@ -150,6 +183,7 @@ impl UsageError {
                 "calibrate two cameras together; a single one gives rays only"
             }
             Self::NoSuchMethod { .. } => "leave --method out for the joint estimate",
+            Self::NoSuchPose { .. } => "poses count from 0; see calib-offline inspect DATASET",
             Self::OutputIsInput { .. } => "choose another place with -o",
         };
         Some(text.to_owned())
@@ -185,6 +219,8 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Sufficiency(_)
+            | Self::FewImages { .. }
+            | Self::Labels { .. }
             | Self::Detect(DetectError::Consistency(_))
             | Self::Init(_)
             | Self::Estimate(_)
@@ -198,6 +234,7 @@ impl Error {
             | Self::Blob(_)
             | Self::Matches(_)
             | Self::Pack(_)
+            | Self::Demo(_)
             | Self::Json(_)
             | Self::Write(_)
             | Self::Usage(_) => 2,
@@ -210,7 +247,17 @@ impl Error {
             Self::Manifest(error) => error.remedy(),
             Self::Corners(error) => error.remedy(),
             Self::Sufficiency(error) => error.remedy(),
-            Self::Detect(DetectError::NoImages) => None,
+            Self::FewImages { .. } => Some(
+                "correct dataset.toml or the images as the reason says; calib-offline detect DATASET \
+                 --overlay DIR gives the reason for every image"
+                    .to_owned(),
+            ),
+            Self::Labels { suspicion, .. } => Some(suspicion.remedy()),
+            Self::Detect(DetectError::NoImages) => {
+                Some("add images = \"folder/*.png\" to each [[camera]] of dataset.toml".to_owned())
+            }
+            Self::Detect(DetectError::BrokenImage { source, .. }) => Some(source.remedy()),
+            Self::Json(_) | Self::Demo(_) => None,
             Self::Detect(_) => Some(
                 "look at the images with --overlay DIR; a board with an odd and an even number of corners cannot be turned unnoticed"
                     .to_owned(),
@@ -227,7 +274,6 @@ impl Error {
             Self::Blob(error) => error.remedy(),
             Self::Matches(error) => error.remedy(),
             Self::Pack(error) => pack_remedy(error),
-            Self::Json(_) => None,
             Self::Write(error) => error.remedy(),
             Self::Usage(error) => error.remedy(),
         }
@@ -246,6 +292,10 @@ fn pack_remedy(error: &PackError) -> Option<String> {
         PackError::NothingCalibrated { .. } => {
             "calibrate with corners over more of the sensor".to_owned()
         }
-        _ => return None,
+        _ => {
+            "check the lengths and the camera names with calib-offline inspect: a blob holds up to \
+              a kilometer and needs names that differ"
+                .to_owned()
+        }
     })
 }

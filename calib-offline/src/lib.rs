@@ -1,10 +1,11 @@
-//! Camera calibration with one ray per pixel, from a chessboard on a rotation stage.
+#![doc = include_str!("../README.md")]
 
 pub mod adjust;
 pub mod atomic_file;
 pub mod board;
 pub mod cli;
 pub mod dataset;
+pub mod demo;
 pub mod detect;
 pub mod error;
 pub mod evaluate;

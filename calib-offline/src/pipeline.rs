@@ -1,21 +1,24 @@
 //! The procedure from top to bottom, one call per step: the file to read first.
 //!
-//! A dataset's corners become observations; initialization finds lenses and poses; the joint
-//! estimate adjusts everything; held-out boards judge it; the record says all of it.
+//! A dataset's corners become observations; initialization finds lenses and poses, and the views
+//! that cannot be what they claim; the joint estimate adjusts everything and looks at the views
+//! once more; held-out boards judge it; the record says all of it.
 
 mod summary;
 
 use crate::adjust::Observations;
 use crate::dataset::corners::load_corners;
 use crate::dataset::split::without_excluded;
-use crate::dataset::sufficiency::check_sufficiency;
+use crate::dataset::sufficiency::{SufficiencyError, check_sufficiency};
 use crate::dataset::{Dataset, View};
+use crate::detect::suspicion::suspicious_labels;
+use crate::detect::verdict::Outcome;
 use crate::detect::{self, DetectSettings};
 use crate::error::{Error, UsageError};
-use crate::evaluate::held_out::{HeldOut, held_out};
 use crate::evaluate::verdict::Thresholds;
+use crate::evaluate::{Folds, estimate_folds, held_out};
 use crate::init::rig::start_rig;
-use crate::joint::estimate;
+use crate::joint::estimate_screened;
 use crate::progress::Progress;
 use crate::report::Calibration;
 use clap::ValueEnum;
@@ -95,6 +98,15 @@ pub fn corners(
     })
 }
 
+/// A calibration, and what its held-out check was made from.
+#[derive(Debug)]
+pub struct Checked {
+    /// The calibration.
+    pub calibration: Calibration,
+    /// The estimates of the held-out check, for whoever wants to measure with them.
+    pub folds: Folds,
+}
+
 /// Calibrates a dataset.
 ///
 /// Deterministic: the same input gives the same result on the same build, whatever the number of
@@ -108,10 +120,11 @@ pub fn calibrate(
     progress: &dyn Progress,
 ) -> Result<Calibration, Error> {
     let corners = corners(dataset, &settings.detect, progress)?;
-    calibrate_corners(dataset, &corners, settings, progress)
+    let checked = calibrate_corners(dataset, &corners, settings, progress)?;
+    Ok(checked.calibration)
 }
 
-/// [`calibrate`] from corners that are there already.
+/// [`calibrate`] from corners that are there already; keeps what the check was made from.
 ///
 /// # Errors
 /// Data that cannot determine the answer.
@@ -120,39 +133,91 @@ pub fn calibrate_corners(
     corners: &Corners,
     settings: &CalibrateSettings,
     progress: &dyn Progress,
-) -> Result<Calibration, Error> {
+) -> Result<Checked, Error> {
     if settings.method != Method::Joint {
         return Err(Error::Usage(UsageError::NoSuchMethod {
             method: settings.method.name(),
         }));
     }
+    check_excluded(dataset, &corners.views)?;
     let selection = without_excluded(corners.views.clone(), &dataset.excluded_poses);
-    check_sufficiency(dataset, &selection.used)?;
+    check_sufficiency(dataset, &selection.used)
+        .map_err(|error| with_refusals(dataset, error, corners.detection.as_ref()))?;
+    // Labels that contradict each other are looked for only where they would explain a failure.
+    let explained = |error: Error| match suspicious_labels(dataset, &selection.used) {
+        Some(suspicion) => Error::Labels {
+            suspicion,
+            source: Box::new(error),
+        },
+        None => error,
+    };
     let sensors = dataset.cameras.iter().map(|camera| camera.sensor).collect();
     let observations = Observations::new(dataset.board, sensors, &selection.used);
 
     progress.begin("initialize", 1);
-    let start = start_rig(&observations)?;
+    let start = start_rig(&observations).map_err(|error| explained(error.into()))?;
     progress.end();
 
     progress.begin("estimate", 1);
-    let estimate = estimate(&observations, &start)?;
+    let (mut estimate, findings) =
+        estimate_screened(&observations, start).map_err(|error| explained(error.into()))?;
+    let names: Vec<String> = dataset.cameras.iter().map(|c| c.name.clone()).collect();
+    let mut rig = estimate.rig(&names);
+    estimate.fill_uncertainty(&mut rig)?;
     progress.end();
 
-    let unseen = if observations.poses.len() >= 2 * crate::dataset::sufficiency::MIN_POSES {
+    let folds = if estimate.pose_count() >= 2 * crate::dataset::sufficiency::MIN_POSES {
         progress.begin("check on held-out poses", settings.folds);
-        let unseen = held_out(&observations, settings.folds, progress);
+        let folds = estimate_folds(&estimate.observations, settings.folds, progress);
         progress.end();
-        unseen
+        folds
     } else {
-        HeldOut::default()
+        Folds::default()
     };
-    Ok(summary::record(&summary::Parts {
+    let calibration = summary::record(&summary::Parts {
         dataset,
         corners,
         observations: &observations,
         estimate: &estimate,
-        held_out: &unseen,
+        rig,
+        findings: &findings,
+        held_out: &held_out(&folds),
         thresholds: &settings.thresholds,
-    }))
+    });
+    Ok(Checked { calibration, folds })
+}
+
+/// Every pose that is left out must be one: a slip in a number would leave the bad pose in.
+fn check_excluded(dataset: &Dataset, views: &[View]) -> Result<(), UsageError> {
+    let last_seen = views.iter().map(|view| view.pose).max();
+    let last_image = dataset.image_pose_count().checked_sub(1);
+    let last = last_seen.max(last_image).unwrap_or(0);
+    match dataset.excluded_poses.iter().find(|pose| **pose > last) {
+        Some(&pose) => Err(UsageError::NoSuchPose { pose, last }),
+        None => Ok(()),
+    }
+}
+
+/// Too few corners, with the reason for which images were refused.
+fn with_refusals(
+    dataset: &Dataset,
+    source: SufficiencyError,
+    detection: Option<&detect::Detection>,
+) -> Error {
+    let images = detection.map_or(&[][..], |detection| &detection.images);
+    let mut refused = images.iter().filter_map(|image| match &image.outcome {
+        Outcome::Refused(reason) => Some((image, reason)),
+        Outcome::Used { .. } => None,
+    });
+    let Some((image, reason)) = refused.next() else {
+        return Error::Sufficiency(source);
+    };
+    let path = image.path.strip_prefix(&dataset.folder);
+    let path = path.unwrap_or(&image.path);
+    Error::FewImages {
+        first: format!("{}: {reason}", path.display()),
+        refused: 1 + refused.count(),
+        total: images.len(),
+        source,
+    }
 }

@@ -1,6 +1,8 @@
 //! Bad datasets, given to the real binary: each is refused with the right exit code and a message
 //! that names the place and the remedy, and nothing is left half-written.
 
+#![allow(clippy::format_push_string, reason = "shorter than write! in a test")]
+
 mod common;
 
 use common::{MANIFEST, contents, corners_csv, dataset, run};
@@ -186,4 +188,456 @@ fn output_path_that_is_a_file() {
             .assert_says(&["is a file, a folder is needed"]);
     }
     assert_eq!(contents(folder.path()), before);
+}
+
+/// The corners of six poses, each changed or left out: camera, pose, row, col, u, v.
+type Fields = (String, usize, usize, usize, f64, f64);
+
+fn changed_corners(change: impl Fn(Fields) -> Option<Fields>) -> String {
+    let mut text = String::from("camera,pose,row,col,u,v\n");
+    for line in corners_csv(6).lines().skip(1) {
+        let f: Vec<&str> = line.split(',').collect();
+        let count = |k: usize| f[k].parse::<usize>().unwrap();
+        let pixel = |k: usize| f[k].parse::<f64>().unwrap();
+        let corner = (
+            f[0].to_owned(),
+            count(1),
+            count(2),
+            count(3),
+            pixel(4),
+            pixel(5),
+        );
+        if let Some((camera, pose, row, col, u, v)) = change(corner) {
+            text += &format!("{camera},{pose},{row},{col},{u},{v}\n");
+        }
+    }
+    text
+}
+
+#[test]
+fn manifests_with_values_that_cannot_be_meant() {
+    let too_long = format!("\"{}\"", "l".repeat(65));
+    let cases: &[(&str, &str, &[&str])] = &[
+        (
+            "square_mm = 20.0",
+            "square_mm = 1e300",
+            &[":5:", "ten meters"],
+        ),
+        (
+            "square_mm = 20.0",
+            "square_mm = 1e-9",
+            &[":5:", "micrometer"],
+        ),
+        (
+            "square_mm = 20.0",
+            "square_mm = \"20 mm\"",
+            &[":5:", "square_mm"],
+        ),
+        (
+            "rows = 6",
+            "rows = 1",
+            &[":3:", "rows = 1", "inner corners"],
+        ),
+        ("rows = 6", "rows = -6", &[":3:", "rows = -6"]),
+        ("cols = 5", "cols = 5.5", &[":4:", "5.5"]),
+        ("cols = 5", "cols = 5\ncols = 5", &[":5:", "duplicate"]),
+        ("width = 640", "width = 0", &[":9:", "width = 0"]),
+        ("width = 640", "width = 40000", &[":9:", "32768"]),
+        ("width = 640", "width = 640.5", &[":9:", "640.5"]),
+        ("\"left\"", "\"le,ft\"", &[":8:", "letters, digits"]),
+        ("\"left\"", "\"le\\nft\"", &[":8:", "letters, digits"]),
+        ("\"left\"", "\"\"", &[":8:", "letters, digits"]),
+        ("\"left\"", &too_long, &[":8:", "64 letters"]),
+        (
+            "[board]",
+            "[dataset]\nexclude = [-1]\n[board]",
+            &[":2:", "-1"],
+        ),
+        (
+            "[board]",
+            "[stage]\nangles_deg = [nan]\n[board]",
+            &[":2:", "degrees"],
+        ),
+        (
+            "[board]",
+            "[stage]\nplacement = [0]\n[board]",
+            &["placement", "1 entries"],
+        ),
+        ("[board]", "[board", &[":1:"]),
+        ("[[camera]]", "[camera]", &["dataset.toml:"]),
+    ];
+    for (from, to, parts) in cases {
+        refused_manifest(from, to, parts);
+    }
+    let camera = |k: usize| format!("\n[[camera]]\nname = \"c{k}\"\nwidth = 9\nheight = 9\n");
+    let many = MANIFEST.to_owned() + &(0..63).map(camera).collect::<String>();
+    refused(&many, b"", 2, &["65 cameras", "64 are possible"]);
+    let deep = format!("a = {}", "[".repeat(100_000));
+    refused(&deep, b"", 2, &["dataset.toml:1:"]);
+}
+
+#[test]
+fn a_manifest_that_is_no_text() {
+    let folder = dataset("", b"");
+    let bytes: Vec<u8> = (0..=255).collect();
+    std::fs::write(folder.path().join("set/dataset.toml"), bytes).unwrap();
+    run(folder.path(), &["calibrate", "set", "-o", "out"])
+        .assert_code(2)
+        .assert_says(&["dataset.toml", "not text", "UTF-8", "try: "]);
+}
+
+#[test]
+fn places_that_are_no_dataset() {
+    let folder = dataset(MANIFEST, corners_csv(6).as_bytes());
+    std::fs::create_dir_all(folder.path().join("odd/dataset.toml")).unwrap();
+    let before = contents(folder.path());
+    for place in ["set/corners.csv", "odd", "/dev/null"] {
+        for verb in ["calibrate", "detect"] {
+            let output: &[&str] = if verb == "calibrate" {
+                &["-o", "out"]
+            } else {
+                &[]
+            };
+            run(folder.path(), &[&[verb, place], output].concat())
+                .assert_code(2)
+                .assert_says(&["there is no dataset.toml here", "try: "]);
+        }
+    }
+    assert_eq!(contents(folder.path()), before);
+}
+
+#[test]
+fn rows_that_are_no_corners() {
+    let long = "x".repeat(3_000_000);
+    let digits = format!("left,0,0,2,{},100", "1".repeat(1_000_000));
+    let cases: &[(&str, &[&str])] = &[
+        (&long, &["corners.csv:4:", "1 fields"]),
+        (&digits, &["corners.csv:4:", "finite"]),
+        ("left,0,0,2,1e300,100", &["outside camera", "image size"]),
+        ("left,0,0,2,-1e300,100", &["outside camera", "image size"]),
+        ("left,-1,0,2,100,100", &["corners.csv:4:", "pose", "-1"]),
+        (
+            "left,18446744073709551616,0,2,100,100",
+            &["corners.csv:4:", "pose"],
+        ),
+        ("left,0,1.5,2,100,100", &["corners.csv:4:", "row", "1.5"]),
+        ("left,0,0,\0,100,100", &["corners.csv:4:", "col"]),
+        ("left,0,0,2,\"100,100", &["corners.csv:4:", "u is"]),
+        ("left,0,0,2,100,5,100,5", &["corners.csv:4:", "8 fields"]),
+        ("left;0;0;2;100;100", &["corners.csv:4:", "1 fields"]),
+    ];
+    for (row, parts) in cases {
+        refused_corners(|lines| lines[3] = (*row).to_owned(), parts);
+    }
+    for sigma in ["0", "-1", "nan", "inf"] {
+        refused_corners(
+            |lines| {
+                for line in lines.iter_mut() {
+                    line.push_str(",0.1");
+                }
+                lines[0] = "camera,pose,row,col,u,v,sigma_px".to_owned();
+                lines[3] = format!("left,0,0,2,300,200,{sigma}");
+            },
+            &["corners.csv:4:", "sigma_px"],
+        );
+    }
+    let semicolons = corners_csv(6).replace(',', ";");
+    refused(
+        MANIFEST,
+        semicolons.as_bytes(),
+        2,
+        &["corners.csv:1:", "commas"],
+    );
+    let wide: Vec<u8> = corners_csv(6)
+        .encode_utf16()
+        .flat_map(u16::to_le_bytes)
+        .collect();
+    refused(MANIFEST, &wide, 2, &["corners.csv:1:"]);
+    refused(MANIFEST, b"camera,pose,row,col,u,v\n", 2, &["no corners"]);
+}
+
+/// What spreadsheets and editors do to a file is no mistake.
+#[test]
+fn line_ends_marks_blanks_and_quotes_mean_nothing() {
+    let text = corners_csv(6);
+    let quoted = text
+        .replace("camera,pose", "\"camera\",\"pose\"")
+        .replace("left", "\"left\"");
+    for corners in [
+        text.replace('\n', "\r\n"),
+        format!("\u{feff}{text}"),
+        text.replace(',', " , "),
+        quoted,
+        format!("{text}\n\n"),
+    ] {
+        let manifest = format!("\u{feff}{}", MANIFEST.replace('\n', "\r\n"));
+        let folder = dataset(&manifest, corners.as_bytes());
+        let object = run(folder.path(), &["inspect", "set", "--json"])
+            .assert_code(0)
+            .json();
+        assert_eq!(object["capture"]["poses_seen_by_all"], 6);
+    }
+}
+
+#[test]
+fn views_that_determine_nothing() {
+    let only = |keep: fn(&Fields) -> bool| changed_corners(|f| keep(&f).then_some(f));
+    let at = |place: fn(usize, usize) -> (f64, f64)| {
+        changed_corners(move |(camera, pose, row, col, _, _)| {
+            let (u, v) = place(row, col);
+            Some((camera, pose, row, col, u, v))
+        })
+    };
+    let grid = |row: usize, col: usize| (100.0 + 30.0 * col as f64, 80.0 + 30.0 * row as f64);
+    let third = format!("{MANIFEST}\n[[camera]]\nname = \"top\"\nwidth = 9\nheight = 9\n");
+    let cases: [(&str, String, &[&str]); 7] = [
+        (&third, corners_csv(6), &["\"top\"", "0 usable poses"]),
+        (
+            MANIFEST,
+            only(|f| f.0 == "left"),
+            &["\"right\"", "0 usable poses"],
+        ),
+        (
+            MANIFEST,
+            only(|f| f.0 == "left" || f.1 < 1),
+            &["\"right\"", "1 usable pose,"],
+        ),
+        (
+            MANIFEST,
+            only(|f| (f.0 == "left") == (f.1 % 2 == 0)),
+            &["\"right\" shares no usable pose"],
+        ),
+        (MANIFEST, only(|f| f.2 == 0), &["\"left\"", "on a line"]),
+        (
+            MANIFEST,
+            at(|_, _| (300.0, 200.0)),
+            &["\"left\"", "on a line"],
+        ),
+        (MANIFEST, at(grid), &["\"left\"", "1 different place,"]),
+    ];
+    for (manifest, corners, parts) in cases {
+        refused(manifest, corners.as_bytes(), 3, parts);
+    }
+}
+
+/// Labels of which each is possible, and which contradict each other.
+#[test]
+fn labels_that_do_not_belong_together() {
+    let mirrored = changed_corners(|(camera, pose, row, col, u, v)| {
+        let u = if camera == "left" { 639.0 - u } else { u };
+        Some((camera, pose, row, col, u, v))
+    });
+    let folder = dataset(MANIFEST, mirrored.as_bytes());
+    run(folder.path(), &["calibrate", "set", "-o", "out"])
+        .assert_code(3)
+        .assert_says(&["mirrored in pose 0", "try: number rows and columns alike"]);
+    let inspected = run(folder.path(), &["inspect", "set"]);
+    let words = "6 of 12 views number the board as a mirror would";
+    assert!(inspected.stdout.contains(words), "{}", inspected.stdout);
+
+    let turned = changed_corners(|(camera, pose, row, col, u, v)| {
+        let (row, col) = if camera == "right" {
+            (5 - row, 4 - col)
+        } else {
+            (row, col)
+        };
+        Some((camera, pose, row, col, u, v))
+    });
+    let folder = dataset(MANIFEST, turned.as_bytes());
+    run(folder.path(), &["calibrate", "set", "-o", "out"])
+        .assert_code(3)
+        .assert_says(&["turned by 180 degrees", "\"right\"", "try: turn the labels"]);
+}
+
+#[test]
+fn a_pose_to_leave_out_that_does_not_exist() {
+    let folder = dataset(MANIFEST, corners_csv(6).as_bytes());
+    run(
+        folder.path(),
+        &["calibrate", "set", "-o", "out", "--exclude", "6"],
+    )
+    .assert_code(2)
+    .assert_says(&["no pose 6", "the last is pose 5", "try: "]);
+    assert!(!folder.path().join("out").exists());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn output_folder_that_cannot_be_written() {
+    let folder = dataset(MANIFEST, corners_csv(6).as_bytes());
+    // Not even root makes files there.
+    let refusal = run(folder.path(), &["calibrate", "set", "-o", "/proc/results"]);
+    refusal
+        .assert_code(2)
+        .assert_says(&["/proc/results", "cannot be written", "try: "]);
+    assert!(
+        !refusal.stderr.contains("initialize"),
+        "only after the work"
+    );
+}
+
+mod images {
+    //! Files that should be images.
+
+    use super::common::{MANIFEST, contents, run};
+    use image::{ImageBuffer, Luma, Rgb};
+    use std::fs;
+    use std::path::Path;
+
+    /// A board of 7 x 6 squares of 50 px, a little smaller from pose to pose.
+    fn board(pose: u32, u: u32, v: u32) -> u8 {
+        let square_px = 50 - 4 * pose;
+        let (u, v) = (u.wrapping_sub(60), v.wrapping_sub(60));
+        let on_board = u < 6 * square_px && v < 7 * square_px;
+        let dark = (u / square_px + v / square_px) % 2 == 0;
+        if on_board && dark { 30 } else { 220 }
+    }
+
+    /// Four images per camera.
+    fn dataset() -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        let mut manifest = MANIFEST.to_owned();
+        for camera in ["left", "right"] {
+            let place = folder.path().join("set").join(camera);
+            fs::create_dir_all(&place).unwrap();
+            for pose in 0..4 {
+                let image = ImageBuffer::from_fn(640, 480, |u, v| Luma([board(pose, u, v)]));
+                image.save(place.join(format!("{pose}.png"))).unwrap();
+            }
+            let name = format!("name = \"{camera}\"\n");
+            manifest = manifest.replace(&name, &format!("{name}images = \"{camera}/*.png\"\n"));
+        }
+        fs::write(folder.path().join("set/dataset.toml"), manifest).unwrap();
+        folder
+    }
+
+    #[track_caller]
+    fn refused(folder: &Path, code: i32, parts: &[&str]) {
+        let before = contents(folder);
+        for arguments in [&["calibrate", "set", "-o", "out"][..], &["detect", "set"]] {
+            run(folder, arguments)
+                .assert_code(code)
+                .assert_says(parts)
+                .assert_says(&["try: "]);
+        }
+        assert_eq!(contents(folder), before, "something was written");
+    }
+
+    /// The first bytes of a PNG that claims to be of this size.
+    fn claims_to_be(folder: &Path, width: u32, height: u32) -> Vec<u8> {
+        let path = folder.join("small.png");
+        ImageBuffer::from_pixel(3, 3, Luma([9u8]))
+            .save(&path)
+            .unwrap();
+        let mut bytes = fs::read(&path).unwrap();
+        fs::remove_file(&path).unwrap();
+        bytes[16..20].copy_from_slice(&width.to_be_bytes());
+        bytes[20..24].copy_from_slice(&height.to_be_bytes());
+        bytes
+    }
+
+    #[test]
+    fn a_file_that_is_no_image_of_its_camera() {
+        let folder = dataset();
+        let path = folder.path();
+        let good = fs::read(path.join("set/left/1.png")).unwrap();
+        let small = ImageBuffer::from_pixel(1, 1, Luma([9u8]));
+        small.save(path.join("small.png")).unwrap();
+        let small = fs::read(path.join("small.png")).unwrap();
+        let turned = ImageBuffer::from_pixel(480, 640, Luma([9u8]));
+        turned.save(path.join("turned.png")).unwrap();
+        let turned = fs::read(path.join("turned.png")).unwrap();
+        let huge = claims_to_be(path, i32::MAX as u32, i32::MAX as u32);
+        let cases: [(&[u8], &str); 7] = [
+            (b"", "1.png"),
+            (b"left 1", "1.png"),
+            (&good[..good.len() / 2], "1.png"),
+            (&good[..20], "1.png"),
+            (&huge, "1.png"),
+            (&small, "is 1x1 pixels, but the manifest says 640x480"),
+            (&turned, "width and height swapped?"),
+        ];
+        for (bytes, words) in cases {
+            fs::write(path.join("set/left/1.png"), bytes).unwrap();
+            refused(path, 2, &["camera left, pose 1", words]);
+        }
+        fs::write(path.join("set/right/3.png"), b"").unwrap();
+        refused(path, 2, &["camera left, pose 1", "1 more images"]);
+    }
+
+    #[test]
+    fn images_without_the_board_that_is_described() {
+        let folder = dataset();
+        let path = folder.path();
+        let set = path.join("set/dataset.toml");
+        let manifest = fs::read_to_string(&set).unwrap();
+        let squares = manifest
+            .replace("rows = 6", "rows = 7")
+            .replace("cols = 5", "cols = 6");
+        fs::write(&set, &squares).unwrap();
+        run(path, &["calibrate", "set", "-o", "out"])
+            .assert_code(3)
+            .assert_says(&[
+                "8 of 8 images",
+                "left/0.png",
+                "rows = 6, cols = 5",
+                "not squares",
+            ]);
+        fs::write(&set, manifest).unwrap();
+        for camera in ["left", "right"] {
+            for pose in 0..4 {
+                let place = path.join(format!("set/{camera}/{pose}.png"));
+                ImageBuffer::from_pixel(640, 480, Luma([0u8]))
+                    .save(place)
+                    .unwrap();
+            }
+        }
+        run(path, &["calibrate", "set", "-o", "out"])
+            .assert_code(3)
+            .assert_says(&["8 of 8 images", "left/0.png", "too little contrast"]);
+        assert!(!path.join("out").exists());
+    }
+
+    #[test]
+    fn colors_and_sixteen_bits_are_read_like_gray() {
+        let folder = dataset();
+        let path = folder.path();
+        let deep = ImageBuffer::from_fn(640, 480, |u, v| Luma([u16::from(board(1, u, v)) * 257]));
+        deep.save(path.join("set/left/1.png")).unwrap();
+        let color = ImageBuffer::from_fn(640, 480, |u, v| Rgb([board(2, u, v); 3]));
+        color.save(path.join("set/left/2.png")).unwrap();
+        let object = run(path, &["detect", "set", "--json"])
+            .assert_code(0)
+            .json();
+        assert_eq!(object["used"], 8);
+        assert_eq!(object["corner_count"], 8 * 30);
+    }
+
+    #[test]
+    fn patterns_and_places_that_mean_nothing() {
+        let folder = dataset();
+        let path = folder.path();
+        let set = path.join("set/dataset.toml");
+        let manifest = fs::read_to_string(&set).unwrap();
+        for (from, to, words) in [
+            ("left/*.png", "left/*.jpg", "matches no file"),
+            ("left/*.png", "nowhere/*.png", "cannot be read"),
+            ("left/*.png", "*/0.png", "in the file name only"),
+            ("left/*.png", "right/*.png", "is used twice"),
+            (
+                "left/*.png",
+                "left/?.p*g\"\nimage_list = [\"a\"]\n#",
+                "both images",
+            ),
+        ] {
+            fs::write(&set, manifest.replacen(from, to, 1)).unwrap();
+            refused(path, 2, &["dataset.toml:", words]);
+        }
+        fs::write(&set, &manifest).unwrap();
+        run(path, &["detect", "set", "--overlay", "set/dataset.toml"])
+            .assert_code(2)
+            .assert_says(&["is a file, a folder is needed"]);
+        fs::remove_file(path.join("set/left/1.png")).unwrap();
+        refused(path, 2, &["3 images", "4", "image_list"]);
+    }
 }

@@ -51,6 +51,7 @@ fn golden_rig() -> Rig {
     let hull = [(4.0, 3.0), (60.0, 5.0), (58.0, 44.0), (8.0, 40.0)];
     let corners = hull.iter().map(|(u, v)| PixelPoint::new(*u, *v));
     Rig {
+        uncertainty: Vec::new(),
         cameras: vec![
             CalibratedCamera {
                 name: "left".into(),

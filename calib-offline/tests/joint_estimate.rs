@@ -1,126 +1,79 @@
-//! The joint estimate against simulated rigs whose true rays are known.
+//! The joint estimate against simulated rigs whose true rays are known: how near it comes to the
+//! oracle, which triangulates the same noisy pixels with the true rays.
 
-use calib_offline::adjust::Observations;
-use calib_offline::geometry::{PixelPoint, RigidTransform, so3};
-use calib_offline::init::rig::start_rig;
-use calib_offline::joint::{Estimate, estimate};
-use calib_offline::simulate::{MatchSet, OpticsKind, Scene, SceneSettings};
-use nalgebra::{Matrix3, Vector3};
+mod common;
 
-fn run(scene: &Scene) -> Estimate {
-    let sensors = scene.cameras.iter().map(|c| c.sensor()).collect();
-    let observations = Observations::new(scene.settings.board, sensors, &scene.observe_corners());
-    let t = std::time::Instant::now();
-    let start = start_rig(&observations).unwrap();
-    for (f, m) in start.fields.iter().zip(&start.median_px) {
-        println!("start {:?} median {m:.3} px", f.base);
-    }
-    println!("start took {:?}", t.elapsed());
-    estimate(&observations, &start).unwrap()
-}
+use calib_offline::adjust::StopReason;
+use calib_offline::simulate::OpticsKind;
+use common::against_truth::{measure, run_scene, scene};
 
-/// Best rigid placement of `from` on `to`.
-fn align(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> RigidTransform {
-    let n = from.len() as f64;
-    let (a, b) = (
-        from.iter().sum::<Vector3<f64>>() / n,
-        to.iter().sum::<Vector3<f64>>() / n,
+/// One draw of the noise moves the ratio by 0.005 (standard deviation, METHOD 9.3).
+const DRAW: f64 = 0.005;
+
+#[test]
+fn a_pinhole_rig_reaches_the_oracle() {
+    let ratios: Vec<f64> = (1..=3)
+        .map(|seed| {
+            let scene = scene(OpticsKind::Brown, |s| s.seed = seed);
+            let (estimate, findings) = run_scene(&scene);
+            assert_eq!(findings, [], "seed {seed}");
+            measure(&scene, &estimate, true).ratio
+        })
+        .collect();
+    let mean = ratios.iter().sum::<f64>() / 3.0;
+    assert!(
+        mean < 1.006 + 2.0 * DRAW / 3f64.sqrt() + 0.004,
+        "{ratios:?}"
     );
-    let h: Matrix3<f64> = from
-        .iter()
-        .zip(to)
-        .map(|(p, q)| (q - b) * (p - a).transpose())
-        .sum();
-    let rotation = so3::nearest_rotation(&h).unwrap();
-    RigidTransform::new(rotation, b - rotation * a)
-}
-
-fn rms(differences: impl Iterator<Item = Vector3<f64>>) -> f64 {
-    let (sum, count) = differences.fold((0.0, 0.0), |(s, n), d| (s + d.norm_squared(), n + 1.0));
-    f64::sqrt(sum / count)
-}
-
-fn ratio(scene: &Scene, estimate: &Estimate, set: MatchSet, noisy: bool) -> (f64, f64, f64, usize) {
-    let names = ["left".to_string(), "right".to_string()];
-    let rig = estimate.rig(&names);
-    let (mut measured, mut truth, mut oracle) = (vec![], vec![], vec![]);
-    let matches = scene.matches(set, 3000);
-    for m in &matches {
-        let pixels: &[PixelPoint] = if noisy { &m.pixels } else { &m.true_pixels };
-        if let Ok(point) = rig.triangulate(&[(0, pixels[0]), (1, pixels[1])]) {
-            measured.push(point.point_mm);
-            truth.push(m.point_in_datum);
-            oracle.push(m.oracle_in_datum);
-        }
-    }
-    let aligned = align(&measured, &truth);
-    let error = rms(measured
-        .iter()
-        .zip(&truth)
-        .map(|(p, q)| aligned.point(p) - q));
-    let direct = rms(measured.iter().zip(&truth).map(|(p, q)| p - q));
-    let limit = rms(oracle.iter().zip(&truth).map(|(p, q)| p - q));
-    (error, direct, limit, matches.len() - measured.len())
+    assert!(ratios.iter().all(|ratio| *ratio < 1.02), "{ratios:?}");
 }
 
 #[test]
-fn explore() {
-    for optics in [
-        OpticsKind::Brown,
-        OpticsKind::Paper,
-        OpticsKind::Bumps,
-        OpticsKind::Window,
-        OpticsKind::Port,
-        OpticsKind::Fisheye,
-    ] {
-        let scene = Scene::new(SceneSettings::standard_noisy(optics, 1)).unwrap();
-        let t = std::time::Instant::now();
-        let e = run(&scene);
-        println!(
-            "{optics:?}: {:?} sigma {:.4} nu {} rho {:.3} costs {:?} stop {}",
-            t.elapsed(),
-            e.noise.variance_px2.sqrt(),
-            e.noise.freedom,
-            e.neighbor_correlation,
-            e.costs,
-            e.stop
-        );
-        for set in [MatchSet::Points, MatchSet::Holdout] {
-            let (error, direct, limit, outside) = ratio(&scene, &e, set, true);
-            println!(
-                "   error {error:.5} direct {direct:.5} oracle {limit:.5} ratio {:.4} / {:.4} outside {outside}",
-                error / limit,
-                direct / limit
-            );
-        }
+fn corners_without_noise_reach_the_stated_floor() {
+    let scene = scene(OpticsKind::Brown, |s| s.noise_px = 0.0);
+    let (estimate, findings) = run_scene(&scene);
+    assert_eq!(findings, []);
+    let measured = measure(&scene, &estimate, false);
+    // Corners are never taken to be better than 2e-5 px; 0.05 px are 0.028 mm here, so that this is
+    // 1.1e-5 mm, and a calibration from 6000 of them is better than one of them.
+    assert!(measured.error_mm < 1.1e-5, "{measured:?}");
+    assert!(estimate.stop != StopReason::Singular);
+}
+
+#[test]
+fn outliers_and_gaps_cost_next_to_nothing() {
+    for optics in [OpticsKind::Brown, OpticsKind::Paper] {
+        let scene = scene(optics, |s| {
+            s.outlier_share = 0.05;
+            s.missing_share = 0.2;
+        });
+        let (estimate, findings) = run_scene(&scene);
+        let measured = measure(&scene, &estimate, true);
+        let rejected = estimate
+            .robust_weights
+            .iter()
+            .flatten()
+            .filter(|w| **w == 0.0)
+            .count();
+        let share = rejected as f64 / estimate.observations.corner_count() as f64;
+        assert_eq!(findings, [], "{optics:?}");
+        assert!(measured.ratio < 1.02, "{optics:?}: {measured:?}");
+        // 5 % were displaced by 60 sigma and more; the share varies by 0.3 % (binomial), and some
+        // fell off the sensor.
+        assert!((share - 0.05).abs() < 0.01, "{optics:?}: {share}");
     }
 }
 
 #[test]
-fn noise_free() {
-    for optics in std::env::var("OPTICS")
-        .unwrap_or("Brown,Paper,Bumps,Window,Port,Fisheye".into())
-        .split(",")
-        .map(|name| <OpticsKind as clap::ValueEnum>::from_str(name, true).unwrap())
-    {
-        let scene = Scene::new(SceneSettings::standard(optics, 1)).unwrap();
-        let e = run(&scene);
-        println!(
-            "{optics:?}: sigma {:.3e} nu {} rho {:.3} costs {:?} stop {}",
-            e.noise.variance_px2.sqrt(),
-            e.noise.freedom,
-            e.neighbor_correlation,
-            e.costs,
-            e.stop
-        );
-        for f in &e.smoothness {
-            println!("{f:?}");
-        }
-        for set in [MatchSet::Points, MatchSet::Holdout] {
-            let (error, direct, limit, outside) = ratio(&scene, &e, set, false);
-            println!(
-                "   error {error:.3e} direct {direct:.3e} oracle {limit:.5} outside {outside}"
-            );
-        }
+fn strong_bumps_are_followed_and_ports_are_non_central() {
+    for (optics, limit) in [(OpticsKind::Bumps, 1.09), (OpticsKind::Port, 1.02)] {
+        let scene = scene(optics, |_| ());
+        let (estimate, findings) = run_scene(&scene);
+        let measured = measure(&scene, &estimate, true);
+        assert_eq!(findings, [], "{optics:?}");
+        // METHOD 9.1: 1.055 | 1.076 on bumps (information-limited), 1.0006 | 1.0012 on the port.
+        assert!(measured.ratio < limit, "{optics:?}: {measured:?}");
+        let central = estimate.model.cameras.iter().all(|c| c.field.is_central());
+        assert_eq!(central, optics == OpticsKind::Bumps);
     }
 }

@@ -200,9 +200,7 @@ impl Drop for QemuDevice {
 /// # Errors
 /// [`QemuError`]; what to install if there is no toolchain is said on standard error.
 pub fn build_image(image: &str) -> Result<PathBuf, QemuError> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .unwrap_or(Path::new("."));
+    let root = root();
     let script = root.join("scripts/embedded-cargo.sh");
     if !script.is_file() {
         return Err(QemuError::NoSources {
@@ -224,9 +222,21 @@ pub fn build_image(image: &str) -> Result<PathBuf, QemuError> {
             status,
         });
     }
-    Ok(root
+    Ok(image_path(image))
+}
+
+/// Where the image of this name is once it has been built; it may be stale.
+pub fn image_path(image: &str) -> PathBuf {
+    root()
         .join("target/embedded/thumbv7em-none-eabihf/release")
-        .join(image))
+        .join(image)
+}
+
+/// The workspace's folder.
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .unwrap_or(Path::new("."))
 }
 
 /// Runs an image that ends by itself, such as a check, and returns what it printed over semihosting

@@ -169,13 +169,13 @@ pub fn view_sums(
     let mut field = DMatrix::zeros(components.len(), components.len());
     let mut field_small = DMatrix::zeros(components.len(), small_len);
     let mut scaled = DMatrix::zeros(basis.products().nrows(), n);
-    for a in 0..count {
+    for (a, crossed) in crossed.iter().enumerate() {
         let (start, terms) = (components.start(a), components.terms(a));
         let products = basis.products().rows(0, terms);
         field_small.rows_mut(start, terms).gemm(
             1.0,
             &products,
-            &transposed(&crossed[a], small_len),
+            &transposed(crossed, small_len),
             0.0,
         );
         for b in 0..=a {
@@ -372,13 +372,13 @@ impl Touched {
     /// Adds `weight[a][b]` times the product of two knots' weights for each two components a, b of
     /// each two knots.
     fn add_to(&self, band: &mut BandedMatrix, weight: [[f64; 2]; 2]) {
-        for a in 0..2 {
+        for (a, weight) in weight.iter().enumerate() {
             // What stands in the columns of each run, but for the weight of the row's knot.
             let runs = self.value.map(|values| {
                 let mut run = [0.0; 8];
                 for (pair, value) in run.chunks_exact_mut(2).zip(values) {
-                    pair[0] = value * weight[a][0];
-                    pair[1] = value * weight[a][1];
+                    pair[0] = value * weight[0];
+                    pair[1] = value * weight[1];
                 }
                 run
             });

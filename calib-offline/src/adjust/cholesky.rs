@@ -121,7 +121,7 @@ impl BandedCholesky {
     /// its factor.
     fn factorize_diagonal_block(&mut self, start: usize) -> Option<()> {
         let len = self.block_len(start);
-        let mut lower = [[0.0; BLOCK]; BLOCK];
+        let mut lower = vec![[0.0; BLOCK]; BLOCK];
         for row in 0..len {
             let at = self.at(start + row, start);
             lower[row][..=row].copy_from_slice(&self.rows[at..=at + row]);
@@ -184,7 +184,7 @@ impl BandedCholesky {
                 *entry = panel[k * count + row];
             }
         }
-        let mut square = [0.0; TRIANGLE_BLOCK * TRIANGLE_BLOCK];
+        let mut square = vec![0.0; TRIANGLE_BLOCK * TRIANGLE_BLOCK];
         for first in (0..count).step_by(TRIANGLE_BLOCK) {
             let width = TRIANGLE_BLOCK.min(count - first);
             let columns = row_major(&panel[first..], len, width, count);

@@ -5,6 +5,7 @@
 mod assembly;
 pub mod banded;
 pub mod cholesky;
+pub mod covariance;
 pub mod knots;
 pub mod levenberg;
 pub mod model;

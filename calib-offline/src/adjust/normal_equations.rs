@@ -114,26 +114,38 @@ pub fn cost(
     weights: &Weights,
     priors: &Priors,
 ) -> f64 {
-    let per_view: Vec<f64> = observations
+    let residuals = residuals(model, observations, bases);
+    cost_of_residuals(&residuals, model, observations, weights, priors)
+}
+
+/// [`cost`], given the [`residuals`] of the model.
+pub fn cost_of_residuals(
+    residuals: &[Vec<Option<Vector2<f64>>>],
+    model: &Model,
+    observations: &Observations,
+    weights: &Weights,
+    priors: &Priors,
+) -> f64 {
+    let corners: f64 = observations
         .views
-        .par_iter()
-        .zip(bases)
+        .iter()
+        .zip(residuals)
         .zip(weights)
-        .map(|((view, basis), weights)| {
+        .map(|((view, residuals), weights)| {
             let lost_px = f64::from(observations.sensors[view.camera_idx].width);
-            predict(model, observations, view, basis)
+            residuals
+                .iter()
                 .zip(weights)
-                .map(|(seen, w)| {
-                    let squared = seen
-                        .linearization
-                        .map(|l| l.residual_px.norm_squared())
+                .map(|(residual, w)| {
+                    let squared = residual
+                        .map(|r| r.norm_squared())
                         .filter(|squared| squared.is_finite());
                     w * squared.unwrap_or(lost_px * lost_px)
                 })
-                .sum()
+                .sum::<f64>()
         })
-        .collect();
-    per_view.iter().sum::<f64>() + priors.cost(model)
+        .sum();
+    corners + priors.cost(model)
 }
 
 /// The equations `H step = -gradient` of one linearization, priors included.
@@ -144,7 +156,7 @@ pub struct NormalEquations {
     poses: Vec<Matrix6<f64>>,
     pose_gradients: Vec<Vector6<f64>>,
     /// Global x 6 per pose.
-    coupling: Vec<DMatrix<f64>>,
+    pub(super) coupling: Vec<DMatrix<f64>>,
     splines: Vec<Option<SplineBlock>>,
 }
 
@@ -473,20 +485,25 @@ impl NormalEquations {
 #[derive(Debug, Clone)]
 pub struct Reduced {
     /// Of the global parameters, and of the poses behind them if splines were eliminated.
-    border: BandedCholesky,
+    pub(super) border: BandedCholesky,
     right: DVector<f64>,
-    global_len: usize,
-    eliminated: Eliminated,
+    pub(super) global_len: usize,
+    pub(super) eliminated: Eliminated,
 }
 
 #[derive(Debug, Clone)]
-enum Eliminated {
+pub(super) enum Eliminated {
     Poses(Vec<Cholesky<f64, nalgebra::Const<6>>>),
     /// Per camera.
     Splines(Vec<Option<EliminatedSpline>>),
 }
 
 impl Reduced {
+    /// Number of equations of poses behind those of the global parameters.
+    pub(super) fn pose_columns(&self) -> usize {
+        self.right.len() - self.global_len
+    }
+
     /// Variances of the global parameters (everything else marginalized), if the weights are
     /// inverse variances and the damping was 0.
     pub fn global_variances(&self) -> DVector<f64> {
@@ -590,7 +607,7 @@ fn fixed_columns(layout: &Layout, camera_idx: usize) -> impl Iterator<Item = Opt
 
 /// What a unit of each of a camera's polynomial parameters (columns: direction, then offset) does
 /// to the coefficients of its components (rows, see [`Components`]).
-fn parameters_to_columns(camera: &CameraModel) -> DMatrix<f64> {
+pub(super) fn parameters_to_columns(camera: &CameraModel) -> DMatrix<f64> {
     let components = Components::of(camera);
     let direction = camera.basis.coefficients();
     let offset_len = camera.offset_amounts().len();

@@ -18,6 +18,8 @@ pub struct Observations {
     /// Sensor per camera.
     pub sensors: Vec<SensorSize>,
     /// Numbers of the poses, rising; a pose's index here is its index everywhere in `adjust`.
+    /// A number stands here once per instant: twice if the cameras' views of it do not belong
+    /// together.
     pub poses: Vec<usize>,
     /// One block per view, in (camera, pose) order.
     pub views: Vec<ViewBlock>,
@@ -96,9 +98,12 @@ impl Observations {
 
     /// The views of some poses only, with poses renumbered.
     pub fn with_poses(&self, keep: impl Fn(usize) -> bool) -> Self {
-        let kept: Vec<usize> = (0..self.poses.len())
-            .filter(|idx| keep(self.poses[*idx]))
-            .collect();
+        self.with_pose_indices(|pose_idx| keep(self.poses[pose_idx]))
+    }
+
+    /// The views of the poses with some indices only, with poses renumbered.
+    pub fn with_pose_indices(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let kept: Vec<usize> = (0..self.poses.len()).filter(|idx| keep(*idx)).collect();
         let views = self
             .views
             .iter()
@@ -120,13 +125,11 @@ impl Observations {
 
     /// The views of one camera only, as camera 0; poses it did not see are dropped.
     pub fn of_camera(&self, camera_idx: usize) -> Self {
-        let seen: Vec<usize> = self
-            .views
-            .iter()
-            .filter(|view| view.camera_idx == camera_idx)
-            .map(|view| self.poses[view.pose_idx])
-            .collect();
-        let mut selected = self.with_poses(|pose| seen.contains(&pose));
+        let mut seen = vec![false; self.poses.len()];
+        for view in self.views.iter().filter(|v| v.camera_idx == camera_idx) {
+            seen[view.pose_idx] = true;
+        }
+        let mut selected = self.with_pose_indices(|pose_idx| seen[pose_idx]);
         selected.views.retain(|view| view.camera_idx == camera_idx);
         for view in &mut selected.views {
             view.camera_idx = 0;

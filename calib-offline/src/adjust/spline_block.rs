@@ -167,6 +167,30 @@ impl EliminatedSpline {
         self.factor.ln_determinant()
     }
 
+    /// Replaces a matrix with a row per knot (row-major) by `L^-1` times it.
+    pub fn solve_lower(&self, matrix: &mut [f64], columns: usize) {
+        self.factor.solve_lower(matrix, &vec![0; columns]);
+    }
+
+    /// `Y^T` times such a matrix, as columns of the `rest_len` remaining parameters.
+    pub fn pull(&self, matrix: &[f64], columns: usize, rest_len: usize) -> DMatrix<f64> {
+        let (border_len, rows) = (self.columns.len(), matrix.len() / columns);
+        let mut pulled = DMatrix::zeros(border_len, columns);
+        multiply(
+            &mut column_major_mut(pulled.as_mut_slice(), border_len, columns, border_len),
+            1.0,
+            &column_major(&self.y, border_len, rows, border_len),
+            &row_major(matrix, rows, columns, columns),
+            0.0,
+        );
+        self.columns.scatter(&pulled, rest_len)
+    }
+
+    /// Number of rows: two per knot.
+    pub fn row_count(&self) -> usize {
+        self.y.len() / self.columns.len()
+    }
+
     /// The knots' block of the inverse of everything times some columns, row-major; `rest` is the
     /// factor of the remaining equations, of `rest_len` parameters.
     pub fn covariance_times(
@@ -178,20 +202,11 @@ impl EliminatedSpline {
     ) -> Vec<f64> {
         let rows = columns.len() / column_count;
         let border_len = self.columns.len();
-        let zeros = vec![0; column_count];
         let mut solved = columns.to_vec();
-        self.factor.solve_lower(&mut solved, &zeros);
-        let mut pulled = DMatrix::zeros(border_len, column_count);
-        multiply(
-            &mut column_major_mut(pulled.as_mut_slice(), border_len, column_count, border_len),
-            -1.0,
-            &column_major(&self.y, border_len, rows, border_len),
-            &row_major(&solved, rows, column_count, column_count),
-            0.0,
-        );
-        // Row-major storage is the transpose in column-major storage.
-        let mut inner = self.columns.scatter(&pulled, rest_len).transpose();
-        rest.solve_lower(inner.as_mut_slice(), &zeros);
+        self.solve_lower(&mut solved, column_count);
+        let mut inner = -self.pull(&solved, column_count, rest_len).transpose();
+        // Column-major storage is the transpose in row-major storage.
+        rest.solve_lower(inner.as_mut_slice(), &vec![0; column_count]);
         rest.solve_upper(inner.as_mut_slice(), column_count);
         let own = self.columns.gather(&inner.transpose());
         multiply(

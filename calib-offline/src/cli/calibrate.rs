@@ -6,7 +6,7 @@ use super::place::check_results_folder;
 use crate::atomic_file::{make_folder, write_set};
 use crate::dataset::Dataset;
 use crate::error::{Error, UsageError};
-use crate::pack::{PackSettings, pack};
+use crate::pack::{PackSettings, pack_nearest};
 use crate::pipeline::{CalibrateSettings, Method};
 use crate::progress::Progress;
 use crate::report::facts::Facts;
@@ -27,8 +27,9 @@ made if need be and then holds calibration.json (every number), rig.rays (the bl
 and report.html. Results that stand there already are replaced only with --force.
 
 With --json: schema calib-offline/calibrate/1, verdict, reasons, held_out_*, rms_px, sigma_px,
-cameras, baseline_mm, working_distance_mm, counts of poses, views and corners, left_out, blob,
-calibration, rig, report (the three files).";
+cameras, baseline_mm, working_distance_mm, counts of poses, views and corners, left_out, blob (bytes,
+max_error_px, wanted_error_px: larger than wanted only where f32 cannot say it better), calibration,
+rig, report (the three files).";
 
 /// The blob's bound unless `pack` is asked for another, px: well below the noise of any corner.
 pub const BLOB_MAX_ERROR_PX: f64 = 0.001;
@@ -131,7 +132,7 @@ pub fn run(
     })
 }
 
-/// Estimates, packs, draws the report and writes the three files together.
+/// Estimates, then [`write_results`].
 ///
 /// # Errors
 /// [`Error`], with nothing written.
@@ -142,12 +143,29 @@ pub fn calibrate_into(
     console: &Console,
     estimate: Estimate<'_>,
 ) -> Result<Written, Error> {
+    say_what_is_used(dataset, console);
+    let calibration = estimate(dataset, settings, console.progress())?;
+    write_results(folder, calibration, console)
+}
+
+/// Says so if there are images that nobody looks at.
+pub fn say_what_is_used(dataset: &Dataset, console: &Console) {
     if dataset.corners_path().exists() && dataset.has_images() {
         console.narrate("there are images and corners.csv: the corners are used");
     }
-    let calibration = estimate(dataset, settings, console.progress())?;
+}
+
+/// Packs, draws the report and writes the three files together.
+///
+/// # Errors
+/// [`Error`], with nothing written.
+pub fn write_results(
+    folder: &Path,
+    calibration: Calibration,
+    console: &Console,
+) -> Result<Written, Error> {
     console.progress().begin("packing the blob", 0);
-    let packed = pack(
+    let packed = pack_nearest(
         &calibration.rig,
         &pack_settings(&calibration, BLOB_MAX_ERROR_PX),
     );
@@ -156,7 +174,11 @@ pub fn calibrate_into(
     let blob = BlobFacts {
         bytes: packed.bytes.len(),
         max_error_px: packed.worst_error_px,
+        wanted_error_px: BLOB_MAX_ERROR_PX,
     };
+    if let Some(warning) = blob.warning() {
+        console.warn(&warning);
+    }
     let json = calibration.to_json()?;
     let page = html::page(&calibration, Some(&blob));
     let files = FILES.map(|name| folder.join(name));

@@ -1,16 +1,24 @@
 //! `demo`: the whole chain on the data that comes with the program.
 
 use super::Outcome;
-use super::calibrate::{Estimate, FILES, calibrate_into};
+use super::calibrate::{FILES, Written, pack_settings, say_what_is_used, write_results};
 use super::output::Console;
-use crate::atomic_file::check_folder;
+use crate::atomic_file::{self, check_folder};
 use crate::dataset::Dataset;
+use crate::demo::device::{check_cortex_m, check_simulated, corner_pairs};
+use crate::demo::known::measure_known;
+use crate::demo::page::{Entry, page};
+use crate::demo::unseen::measure_unseen;
+use crate::demo::{DemoError, Measured, words};
 use crate::error::{Error, UsageError};
-use crate::pipeline::CalibrateSettings;
+use crate::evaluate::Folds;
+use crate::pack::AlignedBytes;
+use crate::pipeline::{self, CalibrateSettings, Checked};
 use crate::report::facts::Facts;
 use crate::report::record::Grade;
-use crate::report::text;
+use crate::report::{BlobFacts, text};
 use clap::Args;
+use ray_runtime::RayBlob;
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -20,12 +28,28 @@ Example:
   calib-offline demo
   calib-offline demo -o demo-results";
 
+const FORMATS: &str = "\
+For each dataset: corners are detected, the cameras calibrated, the blob packed and opened by the
+device's runtime, and points measured with it: held-out boards, each with a blob that was made
+without it; where the truth is known, matches.csv and holdout.csv against it. The simulated device
+(and the Cortex-M image in QEMU, if it has been built) must give the host's bits.
+
+-o holds index.html, and per dataset calibration.json, rig.rays and report.html.
+Exit code 1: a verdict is fail, or a device gave other bits than the host.
+
+With --json: schema calib-offline/demo/1, index, datasets, each with dataset, report, blob, the
+fields of calibrate, and measured: unseen_boards (folds, square_mm, neighbor_rms_percent,
+neighbor_rms_mm, neighbor_median_percent, rigid_rms_mm, points, outside, unmet, blob_error_px),
+known_points (file, matches, without_point, errors: points, direct_rms_mm, placed_rms_mm,
+oracle_rms_mm, direct_ratio, placed_ratio), devices (device, matches, points, different),
+no_cortex_m (why there is no Cortex-M among the devices).";
+
 /// The datasets of the demo, folders of `data/`.
 const DATASETS: [&str; 2] = ["opencv-stereo", "stage"];
 
 /// The arguments.
 #[derive(Debug, Args)]
-#[command(before_help = EXAMPLE)]
+#[command(before_help = EXAMPLE, after_help = FORMATS)]
 pub struct DemoArgs {
     /// The folder for the results; earlier results of the demo in it are replaced
     #[arg(short, long, value_name = "DIR", default_value = "demo-results")]
@@ -39,6 +63,7 @@ pub struct DemoArgs {
 #[derive(Debug, Serialize)]
 struct DemoObject {
     schema: &'static str,
+    index: PathBuf,
     datasets: Vec<DatasetObject>,
 }
 
@@ -48,46 +73,124 @@ struct DatasetObject {
     #[serde(flatten)]
     facts: Facts,
     report: PathBuf,
+    blob: BlobFacts,
+    measured: Measured,
 }
 
 /// Runs the command.
 ///
 /// # Errors
 /// [`Error`] of the first dataset that fails; results of the datasets before it stand.
-pub fn run(args: &DemoArgs, console: &Console, estimate: Estimate<'_>) -> Result<Outcome, Error> {
+pub fn run(args: &DemoArgs, console: &Console) -> Result<Outcome, Error> {
     check_folder(&args.output)?;
     let data = data_folder(args.data.as_deref())?;
-    let settings = CalibrateSettings::default();
     let (mut words, mut datasets) = (String::new(), Vec::new());
     for name in DATASETS {
-        let folder = data.join(name);
-        let dataset = Dataset::load(&folder)?;
-        console.narrate(&format!("dataset {}", folder.display()));
-        let place = args.output.join(name);
-        let written = calibrate_into(&place, &dataset, &settings, console, estimate)?;
+        let (object, summary) = run_dataset(&data.join(name), &args.output.join(name), console)?;
         // Writing to a String cannot fail.
-        let _ = write!(
-            words,
-            "{name}\n{}report          {}\n\n",
-            text::summary(&written.calibration, Some(&written.blob)),
-            place.join(FILES[2]).display()
-        );
-        datasets.push(DatasetObject {
-            dataset: folder,
-            facts: Facts::of(&written.calibration),
-            report: place.join(FILES[2]),
-        });
+        let _ = write!(words, "{name}\n{summary}\n");
+        datasets.push(object);
     }
-    let failed = datasets.iter().any(|d| d.facts.verdict == Grade::Fail);
+    let entries: Vec<Entry> = DATASETS
+        .iter()
+        .zip(&datasets)
+        .map(|(name, object)| Entry {
+            name,
+            verdict: object.facts.verdict.word(),
+            measured: &object.measured,
+            report: format!("{name}/{}", FILES[2]),
+        })
+        .collect();
+    let index = args.output.join("index.html");
+    atomic_file::write(&index, page(&entries).as_bytes())?;
+    let _ = writeln!(words, "all of it: {}", index.display());
+    let is_good = |object: &DatasetObject| {
+        object.facts.verdict != Grade::Fail
+            && object.measured.devices.iter().all(|d| d.different == 0)
+    };
+    let outcome = if datasets.iter().all(is_good) {
+        Outcome::Done
+    } else {
+        Outcome::VerdictFail
+    };
     let object = DemoObject {
         schema: "calib-offline/demo/1",
+        index,
         datasets,
     };
     console.result(&words, &object);
-    Ok(if failed {
-        Outcome::VerdictFail
+    Ok(outcome)
+}
+
+/// The chain on one dataset; what came of it, also in words.
+fn run_dataset(
+    folder: &Path,
+    place: &Path,
+    console: &Console,
+) -> Result<(DatasetObject, String), Error> {
+    let dataset = Dataset::load(folder)?;
+    console.narrate(&format!("dataset {}", folder.display()));
+    say_what_is_used(&dataset, console);
+    let settings = CalibrateSettings::default();
+    let corners = pipeline::corners(&dataset, &settings.detect, console.progress())?;
+    let Checked { calibration, folds } =
+        pipeline::calibrate_corners(&dataset, &corners, &settings, console.progress())?;
+    let written = write_results(place, calibration, console)?;
+    console.progress().begin("measuring with the blob", 0);
+    let measured = measure(folder, &written, &folds);
+    console.progress().end();
+    let measured = measured?;
+    let report = place.join(FILES[2]);
+    let mut summary = text::summary(&written.calibration, Some(&written.blob));
+    for (name, fact) in words::lines(&measured) {
+        // Writing to a String cannot fail.
+        let _ = writeln!(summary, "{name:<15} {fact}");
+    }
+    let _ = writeln!(summary, "{:<15} {}", "report", report.display());
+    let object = DatasetObject {
+        dataset: folder.to_owned(),
+        facts: Facts::of(&written.calibration),
+        report,
+        blob: written.blob,
+        measured,
+    };
+    Ok((object, summary))
+}
+
+/// Measures with the blob as it stands on the disk, and with those of the folds.
+fn measure(folder: &Path, written: &Written, folds: &Folds) -> Result<Measured, Error> {
+    let calibration = &written.calibration;
+    let settings = pack_settings(calibration, super::calibrate::BLOB_MAX_ERROR_PX);
+    let unseen_boards = measure_unseen(folds, &settings)?;
+    let [_, rays, _] = &written.files;
+    let bytes = read(rays)?;
+    let blob = RayBlob::open(&bytes).map_err(DemoError::Open)?;
+    let (known_points, known_pairs) = measure_known(folder, &blob)?;
+    let pairs = if known_pairs.is_empty() {
+        corner_pairs(calibration)
     } else {
-        Outcome::Done
+        known_pairs
+    };
+    let mut devices = vec![check_simulated(&bytes, &pairs)?];
+    let mut no_cortex_m = None;
+    match check_cortex_m(&bytes, rays, &pairs) {
+        Ok(check) => devices.push(check),
+        Err(reason) => no_cortex_m = Some(reason),
+    }
+    Ok(Measured {
+        unseen_boards,
+        known_points,
+        devices,
+        no_cortex_m,
+    })
+}
+
+fn read(file: &Path) -> Result<AlignedBytes, Error> {
+    crate::pack::read_aligned(file).map_err(|source| {
+        Error::Blob(crate::error::BlobError::Read {
+            file: file.to_owned(),
+            source,
+        })
     })
 }
 

@@ -58,7 +58,7 @@ pub fn main() -> ExitCode {
 fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
     match verb {
         Verb::Calibrate(args) => calibrate::run(args, console, &crate::pipeline::calibrate),
-        Verb::Demo(args) => demo::run(args, console, &crate::pipeline::calibrate),
+        Verb::Demo(args) => demo::run(args, console),
         Verb::Detect(args) => recording::detect(args, console),
         Verb::Inspect(args) => inspect::run(args, console),
         Verb::Measure(args) => measure::run(args, console),

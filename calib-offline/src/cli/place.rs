@@ -4,7 +4,7 @@
 //! again from their inputs, so an earlier file of the same kind may be replaced by a new one; a
 //! calibration is not cheap, so its folder must not hold one.
 
-use crate::atomic_file::{check_folder, check_place};
+use crate::atomic_file::{check_place, check_writable};
 use crate::error::{Error, UsageError};
 use std::fs::File;
 use std::io::Read;
@@ -39,13 +39,13 @@ pub fn check_file(
     }))
 }
 
-/// Refuses a folder for several files: a file in its place, or any of the files in it, unless
-/// forced.
+/// Refuses a folder for several files: a file in its place, no permission to write there, or any
+/// of the files in it, unless forced.
 ///
 /// # Errors
 /// [`Error::Write`], [`Error::Usage`].
 pub fn check_results_folder(folder: &Path, files: &[&str], force: bool) -> Result<(), Error> {
-    check_folder(folder)?;
+    check_writable(folder)?;
     for name in files {
         let path = folder.join(name);
         if !force && path.exists() && !path.is_dir() {

@@ -73,7 +73,9 @@ pub fn parse_corners(
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut lines = text.lines().enumerate();
     let header = lines.next().map_or("", |(_, line)| line.trim());
-    let columns = match header {
+    // As in the rows, blanks and quotes around a name mean nothing.
+    let names: Vec<&str> = header.split(',').map(unquoted).collect();
+    let columns = match names.join(",").as_str() {
         HEADER => 6,
         HEADER_WITH_SIGMA => 7,
         "" if text.trim().is_empty() => {
@@ -82,10 +84,10 @@ pub fn parse_corners(
                 line: 1,
             });
         }
-        other => {
+        _ => {
             return Err(CornersError::Header {
                 file: file.to_owned(),
-                found: shortened(other),
+                found: shortened(header),
             });
         }
     };
@@ -119,7 +121,7 @@ fn parse_row(
     let mut have = 0;
     for field in text.split(',') {
         if let Some(slot) = fields.get_mut(have) {
-            *slot = field.trim();
+            *slot = unquoted(field);
         }
         have += 1;
     }
@@ -315,6 +317,16 @@ pub fn format_corners(dataset: &Dataset, views: &[View]) -> String {
 /// The distinct pose numbers among the views.
 pub fn poses(views: &[View]) -> BTreeSet<usize> {
     views.iter().map(|view| view.pose).collect()
+}
+
+/// A field without the blanks around it, and without the quotes that some programs put around
+/// every text.
+fn unquoted(field: &str) -> &str {
+    let field = field.trim();
+    field
+        .strip_prefix('"')
+        .and_then(|rest| rest.strip_suffix('"'))
+        .map_or(field, str::trim)
 }
 
 /// The first characters of something that may be long or unprintable.

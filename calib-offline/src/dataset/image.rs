@@ -20,7 +20,7 @@ pub struct GrayImage {
 #[non_exhaustive]
 pub enum ImageError {
     /// The file could not be opened or read.
-    #[error("cannot read image {path}: {source}")]
+    #[error("{}: cannot be read", path.display())]
     Unreadable {
         /// The file.
         path: PathBuf,
@@ -28,7 +28,7 @@ pub enum ImageError {
         source: std::io::Error,
     },
     /// The file is no image of a known format, or a damaged one.
-    #[error("{path} is not a PNG, JPEG, TIFF, BMP or PGM image that can be decoded: {source}")]
+    #[error("{}: is not a PNG, JPEG, TIFF, BMP or PGM image that can be decoded", path.display())]
     Undecodable {
         /// The file.
         path: PathBuf,
@@ -37,8 +37,7 @@ pub enum ImageError {
     },
     /// The image is not as large as the manifest says.
     #[error(
-        "{path} is {found} pixels, but the manifest says {expected}: correct width and height of \
-         this camera, or use the images as they came from the sensor (not scaled, not cropped)"
+        "{}: is {found} pixels, but the manifest says {expected} for this camera", path.display()
     )]
     WrongSize {
         /// The file.
@@ -48,6 +47,28 @@ pub enum ImageError {
         /// Size in the manifest.
         expected: SensorSize,
     },
+}
+
+impl ImageError {
+    /// What to do about it.
+    pub fn remedy(&self) -> String {
+        match self {
+            Self::Unreadable { .. } | Self::Undecodable { .. } => {
+                "copy the image again; or leave the pose out with exclude under [dataset], or take \
+                 the image out of the camera's list (image_list, with \"\" in its place)"
+            }
+            Self::WrongSize { found, expected, .. }
+                if (found.width, found.height) == (expected.height, expected.width) =>
+            {
+                "width and height swapped? Correct them in dataset.toml"
+            }
+            Self::WrongSize { .. } => {
+                "correct width and height of this camera in dataset.toml, or use the images as they \
+                 came from the sensor (not scaled, not cropped)"
+            }
+        }
+        .to_owned()
+    }
 }
 
 impl GrayImage {

@@ -20,8 +20,20 @@ pub const MIN_CORNERS_PER_SIDE: i64 = 3;
 /// Most inner corners along a side; more is a slip of the pen.
 pub const MAX_CORNERS_PER_SIDE: i64 = 1000;
 
-/// Longest side of a sensor, px; more is a slip of the pen.
-pub const MAX_SENSOR_PX: i64 = 1_000_000;
+/// Longest side of a sensor, px: the longest that a blob can describe.
+pub const MAX_SENSOR_PX: i64 = ray_runtime::format::MAX_EXTENT_PX as i64;
+
+/// Most cameras: the most that a blob can hold.
+pub const MAX_CAMERAS: usize = ray_runtime::format::MAX_CAMERAS as usize;
+
+/// Longest name of a camera, characters; it stands in CSV headers and in the blob.
+pub const MAX_NAME_CHARS: usize = 64;
+
+/// Smallest square, mm: a micrometer. Less is a slip of the pen or of the unit.
+pub const MIN_SQUARE_MM: f64 = 1e-3;
+
+/// Largest square, mm: ten meters. More is a slip of the pen or of the unit.
+pub const MAX_SQUARE_MM: f64 = 1e4;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -209,6 +221,10 @@ fn board(source: &Source, raw: Option<Spanned<RawBoard>>) -> Result<BoardSpec, M
         "zero"
     } else if value < 0.0 {
         "negative"
+    } else if value < MIN_SQUARE_MM {
+        "less than a micrometer (the unit is mm)"
+    } else if value > MAX_SQUARE_MM {
+        "more than ten meters (the unit is mm)"
     } else {
         return Ok(BoardSpec {
             rows: rows as usize,
@@ -262,6 +278,13 @@ fn cameras(
             file: file.clone(),
             line: 1,
             key: "[[camera]]",
+        });
+    }
+    if let Some(table) = raw.get(MAX_CAMERAS) {
+        return Err(ManifestError::TooManyCameras {
+            file: file.clone(),
+            line: source.line_of(table),
+            have: raw.len(),
         });
     }
     let mut cameras: Vec<(usize, CameraSpec)> = Vec::with_capacity(raw.len());
@@ -319,11 +342,12 @@ fn camera_name(
     })?;
     let usable = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.');
     let text = name.get_ref();
-    if text.is_empty() || !text.chars().all(usable) {
+    let length = text.chars().count();
+    if length == 0 || length > MAX_NAME_CHARS || !text.chars().all(usable) {
         return Err(ManifestError::CameraName {
             file: source.file.clone(),
             line: source.line_of(name),
-            name: text.clone(),
+            name: text.chars().take(MAX_NAME_CHARS).collect(),
         });
     }
     Ok(text.clone())

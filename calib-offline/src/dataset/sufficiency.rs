@@ -11,6 +11,10 @@ pub const MIN_POSES: usize = 3;
 /// along it. A board seen at 89 degrees still has a share of 1e-2.
 const MIN_SCATTER_SHARE: f64 = 1e-3;
 
+/// Two views are the same if their common corners are no further apart than this (RMS), px. Corner
+/// noise alone stays below it; the smallest step of a stage moves corners by more.
+const SAME_VIEW_PX: f64 = 1.0;
+
 /// Why the corners cannot determine a calibration.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -27,6 +31,18 @@ pub enum SufficiencyError {
         have: usize,
         /// Poses seen without.
         unusable: usize,
+        /// How many it takes.
+        need: usize,
+    },
+    /// The board did not move.
+    #[error("camera \"{camera}\" saw the board {views} times, but in no more than {different} different {}, at least {need} are needed", if *different == 1 { "place" } else { "places" })]
+    SameView {
+        /// The camera.
+        camera: String,
+        /// Usable views.
+        views: usize,
+        /// Views that differ from each other.
+        different: usize,
         /// How many it takes.
         need: usize,
     },
@@ -59,6 +75,9 @@ impl SufficiencyError {
             }
             Self::TooFewPoses { .. } => {
                 "record at least ten poses at different tilts and distances, with the board over the whole image"
+            }
+            Self::SameView { .. } => {
+                "move and tilt the board between the images; the same image again says nothing new"
             }
             Self::OnALine { .. } => {
                 "the board must be seen from its face, and corners of several rows and columns must be given"
@@ -104,6 +123,15 @@ pub fn check_sufficiency(dataset: &Dataset, views: &[View]) -> Result<(), Suffic
                 need: MIN_POSES,
             });
         }
+        let different = different_views(&good);
+        if different < MIN_POSES {
+            return Err(SufficiencyError::SameView {
+                camera: camera.name.clone(),
+                views: good.len(),
+                different,
+                need: MIN_POSES,
+            });
+        }
         usable[camera_idx] = good;
     }
     check_connected(dataset, &usable)
@@ -117,6 +145,33 @@ pub fn spreads_over_plane(corners: &[Corner]) -> bool {
     corners.len() >= 4
         && scatter_share(on_board) > MIN_SCATTER_SHARE
         && scatter_share(in_image) > MIN_SCATTER_SHARE
+}
+
+/// How many of one camera's views differ from each other; counted up to [`MIN_POSES`].
+fn different_views(views: &[View]) -> usize {
+    let mut different: Vec<&View> = Vec::new();
+    for view in views {
+        if different.iter().all(|other| !same_view(view, other)) {
+            different.push(view);
+        }
+        if different.len() == MIN_POSES {
+            break;
+        }
+    }
+    different.len()
+}
+
+/// Whether two views show the same corners at the same pixels. Corners come in (row, col) order.
+fn same_view(a: &View, b: &View) -> bool {
+    let label = |c: &Corner| (c.row, c.col);
+    let (mut count, mut sum_px2) = (0usize, 0.0);
+    for corner in &a.corners {
+        if let Ok(at) = b.corners.binary_search_by_key(&label(corner), label) {
+            count += 1;
+            sum_px2 += corner.pixel.distance_px(b.corners[at].pixel).powi(2);
+        }
+    }
+    count > 0 && sum_px2 <= SAME_VIEW_PX.powi(2) * count as f64
 }
 
 /// Scatter across the best line through the points over the scatter along it, 0 to 1.

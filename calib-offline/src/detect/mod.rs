@@ -17,13 +17,14 @@ pub mod epipolar;
 pub mod grid;
 pub mod labelling;
 pub mod overlay;
+pub mod suspicion;
 pub mod verdict;
 
 #[cfg(test)]
 mod tests;
 
 use crate::board::BoardSpec;
-use crate::dataset::image::GrayImage;
+use crate::dataset::image::{GrayImage, ImageError};
 use crate::dataset::{Corner, Dataset, View};
 use crate::geometry::{PixelPoint, SensorSize};
 use crate::progress::Progress;
@@ -105,7 +106,7 @@ pub struct PairCheck {
 }
 
 /// Why a dataset's images could not be searched as a whole.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DetectError {
     /// There is nothing to look at.
@@ -114,6 +115,22 @@ pub enum DetectError {
          image_list, or corners.csv"
     )]
     NoImages,
+    /// A file that should be an image of this camera and is not: damaged, or of another size.
+    /// An image that merely shows no board is refused and no error.
+    #[error(
+        "the image of camera {camera}, pose {pose}, cannot be used{}",
+        if *more == 0 { String::new() } else { format!(", and {more} more images cannot either") }
+    )]
+    BrokenImage {
+        /// Name of the camera.
+        camera: String,
+        /// Number of the pose.
+        pose: usize,
+        /// Other images that cannot be used.
+        more: usize,
+        /// What is wrong with the first.
+        source: ImageError,
+    },
     /// The images cannot be numbered alike.
     #[error(transparent)]
     Consistency(#[from] ConsistencyError),
@@ -141,7 +158,7 @@ struct Inspected {
 /// included.
 ///
 /// # Errors
-/// [`DetectError`] if there are no images, or if the board looks the same after a turn and nothing
+/// [`DetectError`] if there are no images, if a file is no image of its camera, or if the board looks the same after a turn and nothing
 /// tells its turn between poses or cameras.
 pub fn detect_dataset(
     dataset: &Dataset,
@@ -166,17 +183,17 @@ pub fn detect_dataset_with(
         return Err(DetectError::NoImages);
     }
     progress.begin("detecting corners", jobs.len());
-    let inspected: Vec<Result<Inspected, Refusal>> = jobs
+    let loaded: Vec<Result<Result<Inspected, Refusal>, ImageError>> = jobs
         .par_iter()
         .map(|job| {
             let result = GrayImage::load_sized(job.path, job.sensor)
-                .map_err(Refusal::from)
-                .and_then(|image| inspect(detector, &image, &dataset.board, settings));
+                .map(|image| inspect(detector, &image, &dataset.board, settings));
             progress.advance();
             result
         })
         .collect();
     progress.end();
+    let inspected = all_loaded(dataset, &jobs, loaded)?;
 
     let mut figures = Vec::new();
     let mut refusals: Vec<Option<Refusal>> = Vec::new();
@@ -231,6 +248,26 @@ pub fn detect_dataset_with(
         views,
         images,
     })
+}
+
+/// What the images show, if every file could be loaded.
+fn all_loaded<T>(
+    dataset: &Dataset,
+    jobs: &[Job<'_>],
+    loaded: Vec<Result<T, ImageError>>,
+) -> Result<Vec<T>, DetectError> {
+    let broken = loaded.iter().filter(|image| image.is_err()).count();
+    jobs.iter()
+        .zip(loaded)
+        .map(|(job, image)| {
+            image.map_err(|source| DetectError::BrokenImage {
+                camera: dataset.cameras[job.camera_idx].name.clone(),
+                pose: job.pose,
+                more: broken - 1,
+                source,
+            })
+        })
+        .collect()
 }
 
 /// The images to look at, by camera and pose.

@@ -2,7 +2,7 @@
 
 use super::grid::{FittedGrid, Typical};
 use crate::board::BoardSpec;
-use crate::dataset::image::{GrayImage, ImageError};
+use crate::dataset::image::GrayImage;
 use std::path::PathBuf;
 
 /// The verdict on one image.
@@ -42,9 +42,6 @@ pub enum Outcome {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// The file cannot be read, or has another size than the manifest says.
-    #[error(transparent)]
-    Image(#[from] ImageError),
     /// Bright and dark differ by too little.
     #[error(
         "too little contrast: bright and dark differ by {contrast_percent:.1} % of the range; \

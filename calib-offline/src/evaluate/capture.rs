@@ -3,6 +3,7 @@
 
 use crate::dataset::corners::poses;
 use crate::dataset::{Corner, Dataset, View, check_sufficiency};
+use crate::detect::suspicion::turns_like_image;
 use crate::field::CoverageMask;
 use crate::geometry::{PixelPoint, SensorSize};
 use serde::Serialize;
@@ -94,6 +95,7 @@ impl Capture {
             ));
         }
         warnings.extend(board_warning(dataset, views));
+        warnings.extend(mirror_warning(dataset, views));
         for (camera, spec) in self.cameras.iter().zip(&dataset.cameras) {
             warnings.extend(camera.warning(spec.sensor, views_reach(dataset, views, &camera.name)));
         }
@@ -142,6 +144,19 @@ impl CameraCapture {
             )
         })
     }
+}
+
+/// Views whose labels turn the other way than the image does.
+fn mirror_warning(dataset: &Dataset, views: &[View]) -> Option<String> {
+    let mirrored = |view: &&View| turns_like_image(&view.corners) == Some(false);
+    let first = views.iter().find(mirrored)?;
+    Some(format!(
+        "{} of {} views number the board as a mirror would show it (columns and rows turn against u and v; the first is camera {}, pose {}); they are taken as numbered so on purpose, and the cameras to see the board directly",
+        views.iter().filter(mirrored).count(),
+        views.len(),
+        dataset.cameras[first.camera_idx].name,
+        first.pose
+    ))
 }
 
 fn camera_capture<'a>(

@@ -1,15 +1,41 @@
 //! Cross-validation by pose: what the calibration does with boards that it never saw.
+//!
+//! The estimates of the folds are what costs time; they are made once ([`estimate_folds`]) and may
+//! then be judged as often as wanted: in pixels, and in millimeters by anything that turns matches
+//! into points ([`measure_boards`]), be it the f64 rig or a blob in the device's own code.
 
 use super::measured_board::MeasuredBoard;
 use super::resection::residuals_with_free_pose;
 use crate::adjust::Observations;
 use crate::adjust::observations::ViewBlock;
 use crate::dataset::Corner;
-use crate::field::{MeasureError, Rig};
+use crate::field::Rig;
+use crate::geometry::PixelPoint;
 use crate::init::rig::start_rig;
 use crate::joint::{Estimate, estimate};
+use crate::matches::source::{PointSource, RigSource};
+use crate::matches::{Number, Sighting, Status};
 use crate::progress::Progress;
+use nalgebra::Vector3;
 use rayon::prelude::*;
+
+/// An estimate from all poses but those of one fold.
+#[derive(Debug, Clone)]
+pub struct Fold {
+    /// The estimate.
+    pub estimate: Estimate,
+    /// The poses left out.
+    pub unseen: Observations,
+}
+
+/// The estimates of all folds.
+#[derive(Debug, Clone, Default)]
+pub struct Folds {
+    /// In order; those whose training poses gave no estimate are not in it.
+    pub estimated: Vec<Fold>,
+    /// How many gave none.
+    pub failed: usize,
+}
 
 /// Errors on held-out boards, all folds together.
 #[derive(Debug, Clone, Default)]
@@ -18,14 +44,38 @@ pub struct HeldOut {
     pub folds: usize,
     /// Length of the residual vector of every held-out corner with its board's pose refitted, px.
     pub residuals_px: Vec<f64>,
+    /// Held-out corners outside the calibrated area of their fold.
+    pub outside_count: usize,
+    /// The triangulated boards.
+    pub boards: BoardErrors,
+    /// Folds whose training poses gave no estimate.
+    pub failed_folds: usize,
+}
+
+/// Errors of triangulated boards.
+#[derive(Debug, Clone, Default)]
+pub struct BoardErrors {
     /// Relative error of the distance of neighboring corners.
     pub neighbor_errors: Vec<f64>,
     /// Distance of triangulated corners from the best-placed flat board, mm.
     pub rigid_errors_mm: Vec<f64>,
-    /// Held-out corners outside the calibrated area of their fold.
+    /// Corners triangulated.
+    pub point_count: usize,
+    /// Corners seen by two cameras that one of them has no ray for.
     pub outside_count: usize,
-    /// Folds whose training poses gave no estimate.
-    pub failed_folds: usize,
+    /// Corners whose rays do not meet before the cameras.
+    pub unmet_count: usize,
+}
+
+impl BoardErrors {
+    /// Adds those of other boards.
+    pub fn add(&mut self, other: Self) {
+        self.neighbor_errors.extend(other.neighbor_errors);
+        self.rigid_errors_mm.extend(other.rigid_errors_mm);
+        self.point_count += other.point_count;
+        self.outside_count += other.outside_count;
+        self.unmet_count += other.unmet_count;
+    }
 }
 
 /// Fold of the pose with this index: poses are dealt in turn, so that every fold spans the stage.
@@ -33,35 +83,25 @@ pub fn fold_of(pose_idx: usize, folds: usize) -> usize {
     pose_idx % folds.max(1)
 }
 
-/// Estimates each fold from the other folds' poses and measures its boards.
+/// Estimates each fold from the other folds' poses.
 ///
 /// Cost: `folds` estimates, run in parallel with ordered results.
-pub fn held_out(observations: &Observations, folds: usize, progress: &dyn Progress) -> HeldOut {
-    let per_fold: Vec<Option<HeldOut>> = (0..folds)
+pub fn estimate_folds(observations: &Observations, folds: usize, progress: &dyn Progress) -> Folds {
+    let estimated: Vec<Fold> = (0..folds)
         .into_par_iter()
-        .map(|fold| {
-            let result = evaluate_fold(observations, folds, fold);
+        .filter_map(|fold| {
+            let result = estimate_fold(observations, folds, fold);
             progress.advance();
             result
         })
         .collect();
-    let mut all = HeldOut::default();
-    for fold in per_fold {
-        match fold {
-            Some(fold) => {
-                all.folds += 1;
-                all.residuals_px.extend(fold.residuals_px);
-                all.neighbor_errors.extend(fold.neighbor_errors);
-                all.rigid_errors_mm.extend(fold.rigid_errors_mm);
-                all.outside_count += fold.outside_count;
-            }
-            None => all.failed_folds += 1,
-        }
+    Folds {
+        failed: folds - estimated.len(),
+        estimated,
     }
-    all
 }
 
-fn evaluate_fold(observations: &Observations, folds: usize, fold: usize) -> Option<HeldOut> {
+fn estimate_fold(observations: &Observations, folds: usize, fold: usize) -> Option<Fold> {
     let in_fold = |pose: usize| {
         observations
             .poses
@@ -69,29 +109,60 @@ fn evaluate_fold(observations: &Observations, folds: usize, fold: usize) -> Opti
             .is_ok_and(|idx| fold_of(idx, folds) == fold)
     };
     let training = observations.with_poses(|pose| !in_fold(pose));
-    let unseen = observations.with_poses(in_fold);
     let start = start_rig(&training).ok()?;
-    let estimate = estimate(&training, &start).ok()?;
-    Some(measure(&estimate, &unseen))
+    Some(Fold {
+        estimate: estimate(&start.observations, &start).ok()?,
+        unseen: observations.with_poses(in_fold),
+    })
 }
 
-/// Measures unseen boards with an estimate.
-fn measure(estimate: &Estimate, unseen: &Observations) -> HeldOut {
-    let names: Vec<String> = (0..unseen.sensors.len()).map(|k| k.to_string()).collect();
-    let rig = estimate.rig(&names);
-    let mut result = HeldOut::default();
-    for view in &unseen.views {
-        let corners: Vec<Corner> = covered(&rig, view, &mut result.outside_count);
-        let residuals = residuals_with_free_pose(
-            &rig.cameras[view.camera_idx].field,
-            &unseen.board,
-            &estimate.model.board_shape,
-            &corners,
-        );
-        result
-            .residuals_px
-            .extend(residuals.into_iter().flatten().map(|r| r.norm()));
+/// Judges the folds, in f64.
+pub fn held_out(folds: &Folds) -> HeldOut {
+    let mut all = HeldOut {
+        folds: folds.estimated.len(),
+        failed_folds: folds.failed,
+        ..HeldOut::default()
+    };
+    for fold in &folds.estimated {
+        let rig = fold.rig();
+        fold.add_residuals(&rig, &mut all);
+        // Without a frame there is always a source.
+        if let Some(source) = RigSource::new(&rig, None) {
+            all.boards.add(measure_boards(&source, &fold.unseen));
+        }
     }
+    all
+}
+
+impl Fold {
+    /// The rig that this fold's training poses gave; its cameras are named by number.
+    pub fn rig(&self) -> Rig {
+        let names: Vec<String> = (0..self.unseen.sensors.len())
+            .map(|k| k.to_string())
+            .collect();
+        self.estimate.rig(&names)
+    }
+
+    /// Residuals of the corners in the calibrated area; the others are counted.
+    fn add_residuals(&self, rig: &Rig, result: &mut HeldOut) {
+        for view in &self.unseen.views {
+            let corners: Vec<Corner> = covered(rig, view, &mut result.outside_count);
+            let residuals = residuals_with_free_pose(
+                &rig.cameras[view.camera_idx].field,
+                &self.unseen.board,
+                &self.estimate.model.board_shape,
+                &corners,
+            );
+            result
+                .residuals_px
+                .extend(residuals.into_iter().flatten().map(|r| r.norm()));
+        }
+    }
+}
+
+/// Triangulates the boards that two cameras saw, and compares them with the board as it is.
+pub fn measure_boards<S: PointSource>(source: &S, unseen: &Observations) -> BoardErrors {
+    let mut result = BoardErrors::default();
     for pose_idx in 0..unseen.poses.len() {
         let views: Vec<&ViewBlock> = unseen
             .views
@@ -109,22 +180,29 @@ fn measure(estimate: &Estimate, unseen: &Observations) -> HeldOut {
                 .find(|other| (other.row, other.col) == (corner.row, corner.col));
             let Some(other) = other else { continue };
             let sightings = [
-                (left.camera_idx, corner.pixel),
-                (right.camera_idx, other.pixel),
+                sighting(left.camera_idx, corner.pixel),
+                sighting(right.camera_idx, other.pixel),
             ];
-            match rig.triangulate(&sightings) {
-                Ok(point) => board.corners.push((corner.row, corner.col, point.point_mm)),
-                Err(MeasureError::Outside { .. } | MeasureError::Triangulate(_)) => {}
+            match source.point(&sightings) {
+                Ok(found) => {
+                    let point = Vector3::from(found.point_mm.map(Into::into));
+                    board.corners.push((corner.row, corner.col, point));
+                }
+                Err(Status::Outside) => result.outside_count += 1,
+                Err(Status::Parallel | Status::Behind) => result.unmet_count += 1,
             }
         }
-        result
-            .neighbor_errors
-            .extend(board.neighbor_errors(&unseen.board));
-        result
-            .rigid_errors_mm
-            .extend(board.rigid_errors_mm(&unseen.board));
+        result.point_count += board.corners.len();
+        let neighbors = board.neighbor_errors(&unseen.board);
+        result.neighbor_errors.extend(neighbors);
+        let rigid = board.rigid_errors_mm(&unseen.board);
+        result.rigid_errors_mm.extend(rigid);
     }
     result
+}
+
+fn sighting<N: Number>(camera_idx: usize, pixel: PixelPoint) -> Sighting<N> {
+    (camera_idx, [pixel.u, pixel.v].map(nalgebra::convert))
 }
 
 /// The corners of a view inside the calibrated area; the others are counted.

@@ -6,8 +6,9 @@ pub mod held_out;
 pub mod measured_board;
 pub mod resection;
 pub mod stage_axis;
+pub mod truth;
 pub mod verdict;
 
 pub use capture::Capture;
-pub use held_out::{HeldOut, held_out};
+pub use held_out::{Folds, HeldOut, estimate_folds, held_out};
 pub use stage_axis::fit_stage_axes;

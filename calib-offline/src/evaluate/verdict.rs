@@ -45,6 +45,9 @@ pub struct Thresholds {
     pub neighbor_rms_percent: (f64, f64),
     /// Share of corners rejected as outliers.
     pub rejected_share: (f64, f64),
+    /// Share of views that had to be left out, split from their pair or renumbered; above it,
+    /// something is wrong with how the recording is made.
+    pub suspect_views: f64,
     /// Poses used; below the first is doubtful (few views hold no flexible field), below the
     /// second is a fail.
     pub poses: (usize, usize),
@@ -59,6 +62,7 @@ impl Default for Thresholds {
             held_out_ratio: (1.5, 5.0),
             neighbor_rms_percent: (1.0, 10.0),
             rejected_share: (0.03, 0.3),
+            suspect_views: 0.03,
             poses: (10, 3),
             covered_share: 0.5,
         }
@@ -78,6 +82,8 @@ pub struct Figures {
     pub neighbor_rms_percent: Option<f64>,
     /// Corners used and rejected.
     pub corners: (usize, usize),
+    /// Views that could not be used as they were recorded, and all views.
+    pub suspect_views: (usize, usize),
     /// Poses used.
     pub pose_count: usize,
     /// Name and calibrated share of the sensor, per camera.
@@ -138,6 +144,17 @@ pub fn judge(figures: &Figures, thresholds: &Thresholds) -> Verdict {
             "too few poses for a held-out check".to_string(),
         ));
     }
+    let (suspect, views) = figures.suspect_views;
+    if suspect as f64 > thresholds.suspect_views * views as f64 {
+        reasons.push((
+            Grade::Doubtful,
+            format!(
+                "{suspect} of {views} views could not be used as recorded (see what was left out), \
+                 above {:.0} %",
+                100.0 * thresholds.suspect_views
+            ),
+        ));
+    }
     let (few, too_few) = thresholds.poses;
     let grade = match figures.pose_count {
         n if n < too_few => Grade::Fail,
@@ -191,17 +208,22 @@ mod tests {
             held_out_rms_px: Some(0.072),
             neighbor_rms_percent: Some(0.1),
             corners: (5000, 10),
+            suspect_views: (1, 68),
             pose_count: 34,
             covered_share: vec![("left".into(), 0.9)],
             settled: true,
         }
     }
 
+    /// Makes one figure bad.
+    type Spoil = fn(&mut Figures);
+
     #[test]
     fn good_figures_pass_and_each_bad_one_lowers_the_grade() {
         let thresholds = Thresholds::default();
         assert_eq!(judge(&good(), &thresholds).grade, Grade::Pass);
-        let cases: [(fn(&mut Figures), Grade); 6] = [
+        let cases: [(Spoil, Grade); 7] = [
+            (|f| f.suspect_views = (11, 68), Grade::Doubtful),
             (|f| f.sigma_px = 0.4, Grade::Doubtful),
             (|f| f.sigma_px = f64::NAN, Grade::Fail),
             (|f| f.held_out_rms_px = Some(0.5), Grade::Fail),

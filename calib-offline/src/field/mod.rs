@@ -2,12 +2,15 @@
 
 pub mod coverage;
 pub mod polynomial;
+pub mod projection;
 pub mod ray_field;
 pub mod rig;
 pub mod spline;
 pub mod structured;
 pub mod transport;
+pub mod uncertainty;
 
 pub use coverage::CoverageMask;
 pub use ray_field::{BaseLens, FieldSample, Projection, RayField, SmoothMap};
 pub use rig::{CalibratedCamera, MeasureError, Rig};
+pub use uncertainty::PairUncertainty;

@@ -1,8 +1,12 @@
 //! Calibrated cameras in one common frame: what an estimate hands to everything after it.
 
-use super::{CoverageMask, RayField};
+use super::{CoverageMask, PairUncertainty, RayField, transport};
 use crate::geometry::TriangulateError;
-use crate::geometry::{PixelPoint, Ray, RigidTransform, Triangulation, triangulate_rays};
+use crate::geometry::{
+    PixelPoint, Ray, RigidTransform, Triangulation, midpoint_by_shifts, triangulate_pair,
+    triangulate_rays,
+};
+use nalgebra::{Matrix3, Matrix3x4, Matrix4};
 use serde::{Deserialize, Serialize};
 
 /// One calibrated camera.
@@ -25,6 +29,10 @@ pub struct Rig {
     pub cameras: Vec<CalibratedCamera>,
     /// The pose whose board frame is the rig frame.
     pub datum_pose: usize,
+    /// How well pairs of cameras know their rays, the first camera with each other; empty if that
+    /// was not estimated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub uncertainty: Vec<PairUncertainty>,
 }
 
 /// Why a match has no point.
@@ -50,7 +58,62 @@ impl CalibratedCamera {
     }
 }
 
+/// Covariance of a triangulated point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointCovariance {
+    /// From what the calibration leaves uncertain, rig frame, mm^2.
+    pub calibration_mm2: Matrix3<f64>,
+    /// From the noise of the measured pixels, mm^2.
+    pub noise_mm2: Matrix3<f64>,
+}
+
+impl PointCovariance {
+    /// Both together, mm^2.
+    pub fn total_mm2(&self) -> Matrix3<f64> {
+        self.calibration_mm2 + self.noise_mm2
+    }
+}
+
 impl Rig {
+    /// Covariance of the point of two sightings, in either order; `None` if the pair has no
+    /// uncertainty, for a pixel without a ray, and for parallel rays.
+    pub fn pair_covariance(&self, sightings: [(usize, PixelPoint); 2]) -> Option<PointCovariance> {
+        let pair = |first: usize, second: usize| {
+            self.uncertainty
+                .iter()
+                .find(|u| (u.first, u.second) == (first, second))
+        };
+        let [a, b] = sightings;
+        let (uncertainty, [a, b]) = match pair(a.0, b.0) {
+            Some(uncertainty) => (uncertainty, [a, b]),
+            None => (pair(b.0, a.0)?, [b, a]),
+        };
+        let see = |(idx, pixel): (usize, PixelPoint)| {
+            let camera = self.cameras.get(idx)?;
+            let ray = camera.ray_in_rig(pixel)?;
+            let axes =
+                camera.rig_from_camera.rotation * transport::across(&camera.field.sample(pixel).s);
+            Some((ray, axes))
+        };
+        let ((ray_a, axes_a), (ray_b, axes_b)) = (see(a)?, see(b)?);
+        let point = triangulate_pair(&ray_a, &ray_b).ok()?.point_mm;
+        let (by_a, by_b) = midpoint_by_shifts(&ray_a, &ray_b)?;
+        // Columns: what a unit of each ray's direction along its axes does to the point.
+        let mut by_direction = Matrix3x4::zeros();
+        by_direction
+            .fixed_columns_mut::<2>(0)
+            .copy_from(&(by_a * axes_a * (point - ray_a.origin_mm).norm()));
+        by_direction
+            .fixed_columns_mut::<2>(2)
+            .copy_from(&(by_b * axes_b * (point - ray_b.origin_mm).norm()));
+        let (calibration, noise) = uncertainty.at(a.1);
+        let carry = |c: Matrix4<f64>| by_direction * c * by_direction.transpose();
+        Some(PointCovariance {
+            calibration_mm2: carry(calibration),
+            noise_mm2: carry(noise),
+        })
+    }
+
     /// The index of the camera with this name.
     pub fn camera_idx(&self, name: &str) -> Option<usize> {
         self.cameras.iter().position(|camera| camera.name == name)

@@ -55,7 +55,7 @@ impl StructuredBasis {
         for f in affine {
             builder.add(&lattice.project(f), None);
         }
-        for k in (1..=3).filter(|k| 2 * k + 1 <= degree) {
+        for k in (1..=3).filter(|k| 2 * k < degree) {
             builder.add(
                 &lattice.project(|x, y| Vector2::new(x, y) * (x * x + y * y).powi(k as i32)),
                 None,

@@ -12,4 +12,6 @@ pub mod triangulation;
 pub use pixel::{PixelPoint, SensorSize};
 pub use ray::Ray;
 pub use se3::RigidTransform;
-pub use triangulation::{TriangulateError, Triangulation, triangulate_pair, triangulate_rays};
+pub use triangulation::{
+    TriangulateError, Triangulation, midpoint_by_shifts, triangulate_pair, triangulate_rays,
+};

@@ -61,6 +61,27 @@ pub fn triangulate_pair(a: &Ray, b: &Ray) -> Result<Triangulation, TriangulateEr
     })
 }
 
+/// How the midpoint of two rays moves with a shift of either ray (mm per mm).
+///
+/// With the common normal `n` and the in-plane normals `e_k = n x d_k`, shifting ray 1 by `eta`
+/// moves the midpoint by `n (n.eta) / 2 + d_2 (e_1.eta) / (d_2.e_1)`, and likewise for ray 2:
+/// half of the shift out of the rays' plane, and along the other ray within it.
+///
+/// `None` for parallel rays.
+pub fn midpoint_by_shifts(a: &Ray, b: &Ray) -> Option<(Matrix3<f64>, Matrix3<f64>)> {
+    let (d1, d2) = (a.direction.normalize(), b.direction.normalize());
+    let normal = d1.cross(&d2);
+    if !(normal.norm() > MIN_PARALLAX_SIN) {
+        return None;
+    }
+    let n = normal.normalize();
+    let by_shift = |own: &Vector3<f64>, other: &Vector3<f64>| {
+        let e = n.cross(own);
+        n * n.transpose() / 2.0 + other * e.transpose() / other.dot(&e)
+    };
+    Some((by_shift(&d1, &d2), by_shift(&d2, &d1)))
+}
+
 /// The point nearest to any number of rays in the least-squares sense.
 ///
 /// Two rays give exactly [`triangulate_pair`]'s point up to round-off.
@@ -131,6 +152,30 @@ mod tests {
         let result = triangulate_pair(&a, &b).unwrap();
         assert!((result.point_mm - Vector3::new(1.0, 0.0, 1.0)).norm() < 1e-15);
         assert!((result.gap_mm - 2.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn midpoint_moves_as_shifts_of_its_rays_say() {
+        let target = Vector3::new(10.0, -20.0, 300.0);
+        let rays = [[0.0, 0.0, 0.0], [100.0, 15.0, 7.0]].map(|o| {
+            let origin_mm = Vector3::from(o);
+            Ray {
+                origin_mm,
+                direction: target - origin_mm,
+            }
+        });
+        let middle = triangulate_pair(&rays[0], &rays[1]).unwrap().point_mm;
+        let (by_a, by_b) = midpoint_by_shifts(&rays[0], &rays[1]).unwrap();
+        for (shifted, by) in [(0, by_a), (1, by_b)] {
+            for axis in 0..3 {
+                let mut shift = Vector3::zeros();
+                shift[axis] = 1e-3;
+                let mut moved = rays;
+                moved[shifted].origin_mm += shift;
+                let change = triangulate_pair(&moved[0], &moved[1]).unwrap().point_mm - middle;
+                assert!((by * shift - change).norm() < 1e-10);
+            }
+        }
     }
 
     #[test]

@@ -25,7 +25,7 @@ fn centroid_and_spread(points: &[Vector3<f64>]) -> Option<(Vector3<f64>, f64, f6
         xy += d.x * d.y / n;
         yy += d.y * d.y / n;
     }
-    let mean = (xx + yy) / 2.0;
+    let mean = f64::midpoint(xx, yy);
     let half = ((xx - yy) / 2.0).hypot(xy);
     let scale = (xx + yy).sqrt();
     (scale > 0.0).then(|| (centroid, scale, (mean - half).max(0.0).sqrt()))
@@ -73,7 +73,7 @@ pub fn bearing_pose(
         h = -h;
     }
     // Columns of H are r1, r2 (times scale) and t at the centroid, all by one factor.
-    let length = (h.column(0).norm() + h.column(1).norm()) / 2.0;
+    let length = f64::midpoint(h.column(0).norm(), h.column(1).norm());
     if !(length > 0.0) {
         return None;
     }

@@ -1,6 +1,7 @@
 //! One camera: which ideal lens is nearest, then a cubic field and a pose for every board.
 
 use super::bearing_pose::{bearing_pose, is_collinear};
+use super::parallel_rays::affine_median_px;
 use super::{InitError, MIN_CORNERS, MIN_POSES};
 use crate::adjust::levenberg::{self, Settings};
 use crate::adjust::normal_equations::{self, CameraPriors, Priors};
@@ -53,7 +54,7 @@ struct Candidate {
 /// ([`Observations::of_camera`]); `camera_idx` is for errors only.
 ///
 /// # Errors
-/// [`InitError::TooFewPoses`], [`InitError::NoLens`].
+/// [`InitError::TooFewPoses`], [`InitError::NoLens`], [`InitError::ParallelRays`].
 pub fn start_camera(
     observations: &Observations,
     camera_idx: usize,
@@ -88,7 +89,15 @@ pub fn start_camera(
             sensor,
         });
     };
-    place_all(observations, field, camera_idx)
+    let start = place_all(observations, field, camera_idx)?;
+    match affine_median_px(observations) {
+        Some(parallel_px) if parallel_px < start.median_px => Err(InitError::ParallelRays {
+            camera_idx,
+            parallel_px,
+            lens_px: start.median_px,
+        }),
+        _ => Ok(start),
+    }
 }
 
 /// Whether the view alone can place its board.

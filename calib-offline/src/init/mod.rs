@@ -4,11 +4,16 @@
 //! is a near-critical motion for it, and it knows no distortion. Instead ([`focal_scan`]) each
 //! camera tries ideal lenses of many focal lengths and two kinds, places every board by its
 //! bearings ([`bearing_pose`]), and refines the best few with a cubic field; the cameras are then
-//! joined over their common poses ([`rig`]). METHOD section 3.
+//! joined over their common poses ([`rig`]). METHOD section 3. On the way views and pairs of views
+//! that cannot be what they claim are found ([`screening`]).
 
 pub mod bearing_pose;
 pub mod focal_scan;
+pub mod pair_consensus;
+mod parallel_rays;
 pub mod rig;
+pub mod screening;
+pub mod view_fit;
 
 pub use crate::dataset::sufficiency::MIN_POSES;
 use crate::geometry::SensorSize;
@@ -43,6 +48,38 @@ pub enum InitError {
         median_px: f64,
         /// The sensor.
         sensor: SensorSize,
+    },
+    /// The corners look as if seen by parallel rays.
+    #[error(
+        "camera {camera_idx} sees the boards without perspective: parallel projection leaves a \
+         median residual of {parallel_px:.2} px, the best lens {lens_px:.2} px; rays that are all \
+         parallel (a telecentric lens) do not tell how far away and which way tilted a flat board \
+         is, and cannot be calibrated from it"
+    )]
+    ParallelRays {
+        /// Index of the camera.
+        camera_idx: usize,
+        /// Median residual of the best parallel projection of each board.
+        parallel_px: f64,
+        /// Median residual of the best lens.
+        lens_px: f64,
+    },
+    /// The common poses of two cameras contradict each other.
+    #[error(
+        "cameras {reference_idx} and {camera_idx} see the board in {pairs} common pose(s), but no \
+         one placement of the two explains most of them: the middle pair misses by {misfit_px:.1} \
+         px (images of different instants paired, the board numbered differently, or a camera \
+         that moved)"
+    )]
+    CamerasDisagree {
+        /// Index of the camera that was to be placed.
+        camera_idx: usize,
+        /// Index of the camera that it was compared with.
+        reference_idx: usize,
+        /// Root mean square over corners of what the middle pair misses by, px.
+        misfit_px: f64,
+        /// Number of common poses.
+        pairs: usize,
     },
     /// A camera shares no pose with those already placed.
     #[error("camera {camera_idx} shares no pose with the other cameras")]

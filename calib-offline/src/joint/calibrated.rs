@@ -26,7 +26,14 @@ impl Estimate {
         Rig {
             cameras,
             datum_pose: self.observations.poses.first().copied().unwrap_or(0),
+            uncertainty: Vec::new(),
         }
+    }
+
+    /// Number of different poses that went in; one that was split counts once.
+    pub fn pose_count(&self) -> usize {
+        let poses = &self.observations.poses;
+        poses.len() - poses.windows(2).filter(|w| w[0] == w[1]).count()
     }
 
     /// Per pose of the observations, in the rig's frame.

@@ -17,6 +17,10 @@ const OFFSET_DEGREE: usize = 7;
 const ROUNDS: usize = 8;
 /// A round that changes twice the log evidence by less settles the fit.
 const SETTLED: f64 = 0.5;
+/// A model is given up when it is behind its rival by more than this and so many times the change
+/// of its last round: weights that are still on their way gain tens, not more.
+const HOPELESS_GAP: f64 = 100.0;
+const HOPELESS_CHANGES: f64 = 10.0;
 /// Twice the log evidence that a more flexible model must gain: "positive" on the scale of Kass
 /// and Raftery (1995). Ties go to the simpler model.
 const NEEDED_GAIN: f64 = 4.0;
@@ -26,7 +30,8 @@ const NEEDED_GAIN: f64 = 4.0;
 pub struct Choice {
     /// In words.
     pub what: String,
-    /// Twice its log evidence minus that of the model that was best until then.
+    /// Twice its log evidence minus that of the model that was best until then; minus infinity if
+    /// the data leave a parameter of it open, and only roughly so if it is far behind.
     pub gain: f64,
     /// Whether it was taken.
     pub taken: bool,
@@ -41,17 +46,22 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// Takes a fit through rounds until its evidence settles.
+    /// Takes a fit through rounds until its evidence settles, or until it is clear that it cannot
+    /// reach `rival`, the evidence of another model (minus infinity: there is none).
     ///
     /// # Errors
     /// [`EstimateError::Singular`].
-    pub fn settle(mut fit: Fit, observations: &Observations) -> Result<Self, EstimateError> {
+    pub fn settle(
+        mut fit: Fit,
+        rival: f64,
+        observations: &Observations,
+    ) -> Result<Self, EstimateError> {
         let mut evidence = f64::NEG_INFINITY;
         for _ in 0..ROUNDS {
             let now = fit.round(observations)?;
-            let settled = (now - evidence).abs() < SETTLED;
+            let change = (now - evidence).abs();
             evidence = now;
-            if settled {
+            if change < SETTLED || rival - now > HOPELESS_GAP + HOPELESS_CHANGES * change {
                 break;
             }
         }
@@ -60,13 +70,7 @@ impl Candidate {
 }
 
 /// Takes what the evidence asks for, starting from a settled fit without spline and offset.
-///
-/// # Errors
-/// [`EstimateError::Singular`].
-pub fn choose(
-    start: Candidate,
-    observations: &Observations,
-) -> Result<(Candidate, Vec<Choice>), EstimateError> {
+pub fn choose(start: Candidate, observations: &Observations) -> (Candidate, Vec<Choice>) {
     let mut best = start;
     let mut tried = Vec::new();
     take_if_better(
@@ -76,7 +80,7 @@ pub fn choose(
         NEEDED_GAIN,
         observations,
         add_offsets,
-    )?;
+    );
     for cells in CELLS {
         let taken = take_if_better(
             &mut best,
@@ -85,24 +89,17 @@ pub fn choose(
             NEEDED_GAIN,
             observations,
             |model| set_spline(model, cells),
-        )?;
+        );
         if !taken {
             break;
         }
     }
-    simplify(&mut best, &mut tried, observations)?;
-    Ok((best, tried))
+    simplify(&mut best, &mut tried, observations);
+    (best, tried)
 }
 
 /// Drops what the evidence no longer asks for: offsets camera by camera, then splines.
-///
-/// # Errors
-/// [`EstimateError::Singular`].
-pub fn simplify(
-    best: &mut Candidate,
-    tried: &mut Vec<Choice>,
-    observations: &Observations,
-) -> Result<(), EstimateError> {
+pub fn simplify(best: &mut Candidate, tried: &mut Vec<Choice>, observations: &Observations) {
     for camera_idx in 0..best.fit.model.cameras.len() {
         if best.fit.model.cameras[camera_idx].field.offset.is_some() {
             take_if_better(
@@ -112,7 +109,7 @@ pub fn simplify(
                 -NEEDED_GAIN,
                 observations,
                 |model| model.cameras[camera_idx].field.offset = None,
-            )?;
+            );
         }
     }
     if best
@@ -133,9 +130,8 @@ pub fn simplify(
                     camera.field.direction.spline = None;
                 }
             },
-        )?;
+        );
     }
-    Ok(())
 }
 
 fn take_if_better(
@@ -145,15 +141,24 @@ fn take_if_better(
     needed: f64,
     observations: &Observations,
     change: impl FnOnce(&mut Model),
-) -> Result<bool, EstimateError> {
-    let candidate = Candidate::settle(best.fit.changed(observations, change), observations)?;
+) -> bool {
+    // A model that the data leave open has no evidence for it; the one so far stands.
+    let changed = best.fit.changed(observations, change);
+    let Ok(candidate) = Candidate::settle(changed, best.evidence, observations) else {
+        tried.push(Choice {
+            what,
+            gain: f64::NEG_INFINITY,
+            taken: false,
+        });
+        return false;
+    };
     let gain = candidate.evidence - best.evidence;
     let taken = gain > needed;
     tried.push(Choice { what, gain, taken });
     if taken {
         *best = candidate;
     }
-    Ok(taken)
+    taken
 }
 
 fn add_offsets(model: &mut Model) {

@@ -43,6 +43,8 @@ pub struct Estimate {
     pub costs: Vec<f64>,
     /// Why the last adjustment ended.
     pub stop: StopReason,
+    /// The fit behind it all.
+    pub(super) fit: Fit,
 }
 
 /// Why there is no estimate.
@@ -64,14 +66,8 @@ pub enum EstimateError {
 /// # Errors
 /// [`EstimateError::Singular`] if the data leave a parameter open.
 pub fn estimate(observations: &Observations, start: &RigStart) -> Result<Estimate, EstimateError> {
-    let placed: Vec<usize> = observations
-        .poses
-        .iter()
-        .zip(&start.rig_from_board)
-        .filter(|(_, pose)| pose.is_some())
-        .map(|(pose, _)| *pose)
-        .collect();
-    let observations = observations.with_poses(|pose| placed.contains(&pose));
+    let observations =
+        observations.with_pose_indices(|pose_idx| start.rig_from_board[pose_idx].is_some());
     let model = starting_model(start);
 
     // What every lens may use, then where its center of distortion is.
@@ -85,12 +81,12 @@ pub fn estimate(observations: &Observations, start: &RigStart) -> Result<Estimat
 
     // What the evidence asks for beyond, first as if corners were independent: only a field that
     // fits shows how much they are not.
-    let settled = Candidate::settle(fit, &observations)?;
-    let (mut best, mut choices) = choice::choose(settled, &observations)?;
+    let settled = Candidate::settle(fit, f64::NEG_INFINITY, &observations)?;
+    let (mut best, mut choices) = choice::choose(settled, &observations);
     let correlation = best.fit.measure_correlation(&observations);
     if best.fit.share < 1.0 {
-        best = Candidate::settle(best.fit, &observations)?;
-        choice::simplify(&mut best, &mut choices, &observations)?;
+        best = Candidate::settle(best.fit, f64::NEG_INFINITY, &observations)?;
+        choice::simplify(&mut best, &mut choices, &observations);
     }
     let mut fit = best.fit;
     fit.adjust(&observations, LAST_STEPS);
@@ -157,14 +153,15 @@ fn finish(
         .collect();
     Estimate {
         smoothness: fit.smoothness.found(&fit.model),
-        model: fit.model,
+        model: fit.model.clone(),
         observations,
         residuals,
         robust_weights,
         noise: fit.noise,
         neighbor_correlation,
         choices,
-        costs: fit.costs,
+        costs: fit.costs.clone(),
         stop: fit.stop,
+        fit,
     }
 }

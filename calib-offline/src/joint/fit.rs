@@ -4,6 +4,7 @@ use super::correlation::{effective_share, neighbor_correlation};
 use super::estimate::EstimateError;
 use super::evidence::Smoothness;
 use crate::adjust::levenberg::{self, Settings, StopReason};
+use crate::adjust::model::Layout;
 use crate::adjust::normal_equations::{self, NormalEquations, Priors, Reduced, Weights};
 use crate::adjust::observations::ViewBasis;
 use crate::adjust::robust::{StudentT, reweight};
@@ -132,12 +133,13 @@ impl Fit {
         })?;
         let evidence = self.ln_evidence_twice(&reduced, &priors);
         let stepped = self.model.stepped(&layout, &equations.step(&reduced));
-        let cost = |model: &Model| {
-            normal_equations::cost(model, observations, &self.bases, &weights, &priors)
+        let cost = |model: &Model, residuals: &[Vec<Option<Vector2<f64>>>]| {
+            normal_equations::cost_of_residuals(residuals, model, observations, &weights, &priors)
         };
-        if cost(&stepped) < cost(&self.model) {
+        let residuals = normal_equations::residuals(&stepped, observations, &self.bases);
+        if cost(&stepped, &residuals) < cost(&self.model, &self.residuals) {
             self.model = stepped;
-            self.residuals = normal_equations::residuals(&self.model, observations, &self.bases);
+            self.residuals = residuals;
         } else {
             self.adjust(observations, 2);
         }
@@ -145,9 +147,34 @@ impl Fit {
         Ok(evidence)
     }
 
+    /// The equations where the fit stands, factorized without damping.
+    ///
+    /// # Errors
+    /// [`EstimateError::Singular`] if the data leave a parameter open.
+    pub fn equations(
+        &mut self,
+        observations: &Observations,
+    ) -> Result<(Layout, NormalEquations, Reduced), EstimateError> {
+        let weights = self.reweight(observations);
+        let layout = self.model.layout();
+        let equations = NormalEquations::assemble(
+            &self.model,
+            &layout,
+            observations,
+            &self.bases,
+            &weights,
+            &self.priors(),
+        );
+        let reduced = equations.reduce(0.0).ok_or(EstimateError::Singular {
+            free: layout.global_len,
+            corner_count: observations.corner_count(),
+        })?;
+        Ok((layout, equations, reduced))
+    }
+
     fn update_smoothness(
         &mut self,
-        layout: &crate::adjust::model::Layout,
+        layout: &Layout,
         priors: &Priors,
         reduced: &Reduced,
         observations: &Observations,

@@ -4,9 +4,12 @@
 pub mod calibrated;
 pub mod choice;
 pub mod correlation;
+pub mod covariance;
 pub mod estimate;
 pub mod evidence;
 pub mod fit;
+pub mod recheck;
 
 pub use choice::Choice;
 pub use estimate::{Estimate, EstimateError, estimate};
+pub use recheck::estimate_screened;

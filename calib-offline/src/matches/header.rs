@@ -13,7 +13,7 @@ impl Columns {
     /// Reads the header against the names of the rig's cameras.
     ///
     /// # Errors
-    /// [`HeaderProblem`].
+    /// `HeaderProblem`: what is wrong with it.
     pub fn parse(header: &str, cameras: &[String]) -> Result<Self, HeaderProblem> {
         let mut columns = header.split(',').map(str::trim);
         if columns.next() != Some("id") {

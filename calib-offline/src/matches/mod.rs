@@ -6,12 +6,14 @@
 
 mod error;
 mod header;
+mod list;
 mod row;
 pub mod source;
 mod stream;
 
 pub use error::MatchesError;
 pub use header::Columns;
+pub use list::read_matches;
 pub use source::{Number, PointSource, Sighting, Status};
 pub use stream::{MeasureSummary, StreamError, measure_stream};
 

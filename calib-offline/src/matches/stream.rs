@@ -159,7 +159,11 @@ fn first_line(bytes: &[u8]) -> (&[u8], &[u8]) {
     (line.strip_suffix(b"\r").unwrap_or(line), rest)
 }
 
-fn parse_header(file: &Path, header: &[u8], cameras: &[String]) -> Result<Columns, MatchesError> {
+pub(super) fn parse_header(
+    file: &Path,
+    header: &[u8],
+    cameras: &[String],
+) -> Result<Columns, MatchesError> {
     let text = String::from_utf8_lossy(header);
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text).trim();
     let expected = Columns::header_for(cameras);

@@ -1,9 +1,9 @@
 //! From a calibrated rig to the blob that a device opens, within a proven error.
 //!
-//! Each camera's ray field is resampled onto one control grid ([`grid`]), the coarsest that holds
-//! the bound ([`budget`]); the bytes are laid out by the runtime's own schema ([`encode`]); and
+//! Each camera's ray field is resampled onto one control grid (`grid`), the coarsest that holds
+//! the bound (`budget`); the bytes are laid out by the runtime's own schema (`encode`); and
 //! every pixel of the calibrated area is looked up in those bytes by the real runtime and
-//! compared with the f64 field ([`proof`]). The largest difference is written into the blob.
+//! compared with the f64 field (`proof`). The largest difference is written into the blob.
 
 mod aligned_bytes;
 mod banded;
@@ -11,11 +11,13 @@ mod budget;
 mod encode;
 mod field_rows;
 mod grid;
+mod nearest;
 mod proof;
 mod self_test;
 
 pub use aligned_bytes::{AlignedBytes, read_aligned};
 pub use grid::ControlGrid;
+pub use nearest::pack_nearest;
 pub use proof::Proof;
 
 use crate::field::Rig;

@@ -94,6 +94,7 @@ pub fn fisheye_camera() -> CalibratedCamera {
 
 fn rig(cameras: Vec<CalibratedCamera>) -> Rig {
     Rig {
+        uncertainty: Vec::new(),
         cameras,
         datum_pose: 0,
     }
@@ -202,6 +203,25 @@ fn a_bound_below_the_round_off_is_refused_with_the_best_figure() {
     assert_eq!((camera.as_str(), wanted_px), ("left", 1e-6));
     // The round-off of f32 at a focal length of 1400 px.
     assert!(best_px > 3e-5 && best_px < 3e-4, "{best_px}");
+}
+
+#[test]
+fn the_nearest_bound_is_taken_where_the_one_asked_for_cannot_be_held() {
+    let cameras = || vec![smooth_camera(), port_camera()];
+    let best = |error| match error {
+        PackError::BoundNotReached { best_px, .. } => best_px,
+        other => panic!("{other}"),
+    };
+    let refused = best(pack(&rig(cameras()), &settings(1e-6)).unwrap_err());
+    let packed = pack_nearest(&rig(cameras()), &settings(1e-6)).unwrap();
+    // The other camera may need more, but both are at the round-off of f32.
+    let worst = packed.worst_error_px;
+    assert!(worst > 1e-6 && worst < 5.0 * refused, "{worst} {refused}");
+    // A bound that can be held is held.
+    let same = pack_nearest(&rig(cameras()), &settings(0.001)).unwrap();
+    assert_eq!(same, pack(&rig(cameras()), &settings(0.001)).unwrap());
+    let error = pack_nearest(&rig(cameras()), &settings(f64::NAN)).unwrap_err();
+    assert!(matches!(error, PackError::BadSetting { .. }));
 }
 
 #[test]

@@ -9,10 +9,12 @@ use crate::detect::verdict::Outcome;
 use crate::evaluate::HeldOut;
 use crate::evaluate::fit_stage_axes;
 use crate::evaluate::verdict::{Figures, Thresholds, judge};
+use crate::field::Rig;
+use crate::init::screening::{Finding, FindingKind};
 use crate::joint::Estimate;
 use crate::report::record::{
-    Calibration, CornerRecord, EstimateRecord, HeldOutRecord, LeftOut, PoseRecord, SCHEMA,
-    StageAxis,
+    Calibration, CornerRecord, EstimateRecord, HeldOutRecord, LeftOut, PoseRecord, Renumbered,
+    SCHEMA, StageAxis,
 };
 use nalgebra::Vector2;
 
@@ -26,6 +28,10 @@ pub struct Parts<'a> {
     pub observations: &'a Observations,
     /// What it made of it.
     pub estimate: &'a Estimate,
+    /// The rig that it gave.
+    pub rig: Rig,
+    /// What was found wrong with views.
+    pub findings: &'a [Finding],
     /// The check on unseen boards.
     pub held_out: &'a HeldOut,
     /// What counts as good.
@@ -41,7 +47,7 @@ pub fn record(parts: &Parts) -> Calibration {
         .map(|c| c.name.clone())
         .collect();
     let estimate = parts.estimate;
-    let rig = estimate.rig(&names);
+    let rig = parts.rig.clone();
     let corners = corner_records(estimate);
     let poses = pose_records(parts, rig.cameras.len());
     let summary = estimate_record(estimate, &corners);
@@ -53,7 +59,8 @@ pub fn record(parts: &Parts) -> Calibration {
             held_out_rms_px: held_out.as_ref().and_then(|h| h.rms_px),
             neighbor_rms_percent: held_out.as_ref().and_then(|h| h.neighbor_rms_percent),
             corners: (summary.corners_used, summary.corners_rejected),
-            pose_count: estimate.observations.poses.len(),
+            suspect_views: (parts.findings.len(), parts.observations.views.len()),
+            pose_count: estimate.pose_count(),
             covered_share: rig
                 .cameras
                 .iter()
@@ -78,6 +85,7 @@ pub fn record(parts: &Parts) -> Calibration {
         rig,
         corners,
         left_out: left_out(parts, &names),
+        renumbered: renumbered(parts.findings, &names),
         estimate: summary,
         held_out,
         verdict,
@@ -133,11 +141,12 @@ fn held_out_record(held_out: &HeldOut) -> Option<HeldOutRecord> {
     lengths.sort_by(f64::total_cmp);
     Some(HeldOutRecord {
         folds: held_out.folds,
+        failed_folds: held_out.failed_folds,
         rms_px: rms(&lengths),
         median_px: lengths.get(lengths.len() / 2).copied(),
-        neighbor_rms_percent: rms(&held_out.neighbor_errors).map(|e| 100.0 * e),
-        rigid_rms_mm: rms(&held_out.rigid_errors_mm),
-        point_count: held_out.rigid_errors_mm.len(),
+        neighbor_rms_percent: rms(&held_out.boards.neighbor_errors).map(|e| 100.0 * e),
+        rigid_rms_mm: rms(&held_out.boards.rigid_errors_mm),
+        point_count: held_out.boards.point_count,
         outside_count: held_out.outside_count,
     })
 }
@@ -204,7 +213,8 @@ fn left_out(parts: &Parts, names: &[String]) -> Vec<LeftOut> {
     }
     let estimate = parts.estimate;
     for (pose_idx, pose) in parts.observations.poses.iter().enumerate() {
-        if estimate.observations.poses.binary_search(pose).is_err() {
+        let is_named = parts.findings.iter().any(|finding| finding.pose == *pose);
+        if !is_named && estimate.observations.poses.binary_search(pose).is_err() {
             let views = parts.observations.views.iter();
             list.push(LeftOut {
                 pose: *pose,
@@ -236,6 +246,7 @@ fn left_out(parts: &Parts, names: &[String]) -> Vec<LeftOut> {
             });
         }
     }
+    list.extend(parts.findings.iter().filter_map(|f| screened_out(f, names)));
     for image in parts.corners.detection.iter().flat_map(|d| &d.images) {
         if let Outcome::Refused(refusal) = &image.outcome {
             list.push(LeftOut {
@@ -247,6 +258,62 @@ fn left_out(parts: &Parts, names: &[String]) -> Vec<LeftOut> {
         }
     }
     list
+}
+
+/// What the screening left out; `None` for a view that is used as it should be.
+fn screened_out(finding: &Finding, names: &[String]) -> Option<LeftOut> {
+    let (corner_count, reason) = match &finding.kind {
+        FindingKind::Misfit {
+            median_px,
+            typical_px,
+        } => (
+            finding.corner_count,
+            format!(
+                "the whole view misses by {median_px:.2} px (median; {typical_px:.2} px in other \
+                 views): the board moved during the exposure, is bent, or is another one"
+            ),
+        ),
+        FindingKind::Unsynchronized {
+            other_camera_idx,
+            misfit_px,
+            typical_px,
+        } => (
+            0,
+            format!(
+                "not the same board position as in camera {} ({misfit_px:.2} px apart, other pairs \
+                 {typical_px:.2} px): not exposed at the same instant; left out as a pair, each \
+                 view used for its own camera",
+                names[*other_camera_idx]
+            ),
+        ),
+        FindingKind::Renumbered { .. } => return None,
+    };
+    Some(LeftOut {
+        pose: finding.pose,
+        camera: Some(names[finding.camera_idx].clone()),
+        corner_count,
+        reason,
+    })
+}
+
+fn renumbered(findings: &[Finding], names: &[String]) -> Vec<Renumbered> {
+    findings
+        .iter()
+        .filter_map(|finding| match &finding.kind {
+            FindingKind::Renumbered {
+                other_camera_idx, ..
+            } => Some(Renumbered {
+                pose: finding.pose,
+                camera: names[finding.camera_idx].clone(),
+                reason: format!(
+                    "numbered from the other end of the board than in camera {}; renumbered, and \
+                     used",
+                    names[*other_camera_idx]
+                ),
+            }),
+            _ => None,
+        })
+        .collect()
 }
 
 /// Root mean square; `None` of nothing.

@@ -94,6 +94,7 @@ pub fn calibration() -> Calibration {
             terms: vec![(2, 0, 0.03), (0, 2, -0.02)],
         },
         rig: Rig {
+            uncertainty: Vec::new(),
             cameras,
             datum_pose: 8,
         },
@@ -102,6 +103,7 @@ pub fn calibration() -> Calibration {
         poses,
         corners,
         left_out: left_out(),
+        renumbered: Vec::new(),
         held_out: Some(held_out()),
         verdict: Verdict {
             grade: Grade::Doubtful,
@@ -130,6 +132,7 @@ fn estimate(corners: &[CornerRecord]) -> EstimateRecord {
 fn held_out() -> HeldOutRecord {
     HeldOutRecord {
         folds: 5,
+        failed_folds: 0,
         rms_px: Some(0.0741),
         median_px: Some(0.0602),
         neighbor_rms_percent: Some(0.152),

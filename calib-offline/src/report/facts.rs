@@ -105,13 +105,19 @@ impl Facts {
                 .map(|k| (place(k) - place(0)).norm())
                 .collect(),
             working_distance_mm: working_distance(calibration, &views),
-            poses_used: calibration.poses.len(),
+            poses_used: pose_count(calibration),
             views_used: views.len(),
             left_out: calibration.left_out.len(),
             corners_used: calibration.estimate.corners_used,
             corners_rejected: calibration.estimate.corners_rejected,
         }
     }
+}
+
+/// Different poses: one whose views were split has a record for each.
+fn pose_count(calibration: &Calibration) -> usize {
+    let poses: BTreeSet<usize> = calibration.poses.iter().map(|p| p.pose).collect();
+    poses.len()
 }
 
 /// From each camera to the middle of each board it saw.

@@ -14,9 +14,23 @@ pub struct BlobFacts {
     pub bytes: usize,
     /// Largest difference of a ray from the calibration's, px.
     pub max_error_px: f64,
+    /// What it was to be at most, px.
+    pub wanted_error_px: f64,
 }
 
 impl BlobFacts {
+    /// That the blob is worse than it was to be, if it is.
+    pub fn warning(&self) -> Option<String> {
+        (self.max_error_px > self.wanted_error_px).then(|| {
+            format!(
+                "the blob is within {} px of the calibration, not within {} px: no grid of \
+                 single-precision numbers holds that for this sensor and lens",
+                short(self.max_error_px),
+                short(self.wanted_error_px)
+            )
+        })
+    }
+
     /// Size and error with their units.
     pub fn in_words(&self) -> String {
         format!(
@@ -122,7 +136,7 @@ fn headline(calibration: &Calibration, facts: &Facts, blob: Option<&BlobFacts>) 
                 ))
             }
             @if let Some(blob) = blob {
-                (card("Blob", &format!("{} kB", short(blob.bytes as f64 / 1000.0)), &format!("{} bytes, within {} px of the calibration", blob.bytes, short(blob.max_error_px))))
+                (card("Blob", &format!("{} kB", short(blob.bytes as f64 / 1000.0)), &blob.warning().unwrap_or_else(|| format!("{} bytes, within {} px of the calibration", blob.bytes, short(blob.max_error_px)))))
             }
         }
     }
@@ -225,6 +239,7 @@ mod tests {
         BlobFacts {
             bytes: 48_320,
             max_error_px: 0.00042,
+            wanted_error_px: 0.001,
         }
     }
 

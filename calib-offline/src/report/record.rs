@@ -32,7 +32,8 @@ pub struct Calibration {
     pub board_shape: BoardShape,
     /// The calibrated cameras.
     pub rig: Rig,
-    /// Every pose used.
+    /// Every pose used. A pose whose views do not show the board in the same place has one record
+    /// for each place.
     pub poses: Vec<PoseRecord>,
     /// The stage's axis per placement, if the dataset says which placement poses belong to.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -41,6 +42,9 @@ pub struct Calibration {
     pub corners: Vec<CornerRecord>,
     /// What was left out, and why.
     pub left_out: Vec<LeftOut>,
+    /// Views whose board was numbered from the other end: renumbered and used.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub renumbered: Vec<Renumbered>,
     /// How the estimate went.
     pub estimate: EstimateRecord,
     /// Held-out check; `None` if there were too few poses for one.
@@ -104,8 +108,19 @@ pub struct LeftOut {
     pub pose: usize,
     /// Name of the camera; `None` if the pose was left out for all.
     pub camera: Option<String>,
-    /// Number of corners concerned.
+    /// Number of corners left out; 0 where views are used, but not as a pair.
     pub corner_count: usize,
+    /// In words.
+    pub reason: String,
+}
+
+/// A view whose labels were changed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Renumbered {
+    /// Number of the pose.
+    pub pose: usize,
+    /// Name of the camera.
+    pub camera: String,
     /// In words.
     pub reason: String,
 }
@@ -132,6 +147,9 @@ pub struct EstimateRecord {
 pub struct HeldOutRecord {
     /// Number of folds; poses are dealt to folds in turn.
     pub folds: usize,
+    /// Folds whose other poses gave no estimate; nothing is known of their boards.
+    #[serde(default)]
+    pub failed_folds: usize,
     /// RMS residual vector of the held-out corners, board pose refitted, px.
     pub rms_px: Option<f64>,
     /// Median of the same.

@@ -72,6 +72,10 @@ pub fn summary(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
             ),
         ));
     }
+    for view in &calibration.renumbered {
+        let text = format!("pose {}, {}: {}", view.pose, view.camera, view.reason);
+        lines.push(("renumbered", text));
+    }
     if let Some(blob) = blob {
         lines.push(("blob", blob.in_words()));
     }
@@ -105,8 +109,12 @@ fn held_out(calibration: &Calibration, facts: &Facts) -> String {
     if parts.is_empty() {
         return format!("nothing could be measured in {} folds", held_out.folds);
     }
+    let failed = match held_out.failed_folds {
+        0 => String::new(),
+        count => format!("; {count} more gave no estimate"),
+    };
     format!(
-        "{} (RMS, {} folds by pose)",
+        "{} (RMS, {} folds by pose{failed})",
         parts.join(", "),
         held_out.folds
     )

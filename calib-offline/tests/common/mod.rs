@@ -1,5 +1,6 @@
 //! What the tests that drive the real binary share: running it, and inputs for it.
 
+#![allow(clippy::format_push_string, reason = "shorter than write! in a test")]
 #![allow(dead_code, reason = "each test file uses its part")]
 
 use calib_offline::board::BoardSpec;
@@ -11,6 +12,8 @@ use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Stdio};
+
+pub mod against_truth;
 
 pub const BOARD: BoardSpec = BoardSpec {
     rows: 6,
@@ -122,6 +125,7 @@ pub fn rig() -> Rig {
         ),
     });
     Rig {
+        uncertainty: Vec::new(),
         cameras: cameras.into(),
         datum_pose: 0,
     }
@@ -161,6 +165,7 @@ pub fn calibration() -> Calibration {
         stage_axes: Vec::new(),
         corners: Vec::new(),
         left_out: Vec::new(),
+        renumbered: Vec::new(),
         estimate: EstimateRecord {
             cost_per_iteration: Vec::new(),
             stop_reason: "it was never begun".to_owned(),

@@ -66,7 +66,7 @@ pub enum ManifestError {
         line: usize,
         /// The value.
         value: f64,
-        /// In words: zero, negative, not a number, infinite.
+        /// In words: zero, negative, not a number, infinite, too small, too large.
         problem: &'static str,
     },
     /// A number that cannot be meant.
@@ -104,6 +104,16 @@ pub enum ManifestError {
         line: usize,
         /// The name.
         name: String,
+    },
+    /// More cameras than a blob can hold.
+    #[error("{}:{line}: there are {have} cameras; {} are possible", file.display(), super::MAX_CAMERAS)]
+    TooManyCameras {
+        /// The manifest.
+        file: PathBuf,
+        /// From 1: the first one too many.
+        line: usize,
+        /// Cameras.
+        have: usize,
     },
     /// Two cameras with one name.
     #[error("{}:{line}: camera \"{name}\" was already described in line {first_line}", file.display())]
@@ -294,8 +304,9 @@ impl ManifestError {
             }
             Self::BoardKind { .. } => "write kind = \"chessboard\"",
             Self::CameraName { .. } => {
-                "use letters, digits, '-', '_' and '.'; the name becomes part of CSV headers such as u_left"
+                "use up to 64 letters, digits, '-', '_' and '.'; the name becomes part of CSV headers such as u_left"
             }
+            Self::TooManyCameras { .. } => "calibrate the cameras in groups that share poses",
             Self::DuplicateCamera { .. } => "give each camera its own name",
             Self::ImagesTwice { .. } => "keep one of the two",
             Self::PatternInFolder { .. } => {

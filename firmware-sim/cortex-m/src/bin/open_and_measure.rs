@@ -58,7 +58,13 @@ fn main() -> ! {
         match blob.triangulate((0, PixelPoint::new(u0, v0)), (1, PixelPoint::new(u1, v1))) {
             Ok(found) => {
                 let [x, y, z]: [f32; 3] = found.point_mm.into();
-                hprintln!("point {:.1} {:.1} {:.1} mm, gap {:.1} mm", x, y, z, found.gap_mm());
+                hprintln!(
+                    "point {:.1} {:.1} {:.1} mm, gap {:.1} mm",
+                    x,
+                    y,
+                    z,
+                    found.gap_mm()
+                );
             }
             Err(error) => hprintln!("{}", error),
         }

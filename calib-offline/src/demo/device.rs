@@ -1,0 +1,135 @@
+//! The same matches on the host and on a device: the answers must agree to the last bit.
+
+use super::DemoError;
+use super::known::Pair;
+use crate::matches::Sighting;
+use crate::report::Calibration;
+use firmware_sim::client::{ClientError, DeviceClient};
+use firmware_sim::host::SimulatedDevice;
+use firmware_sim::protocol::{Match, Point};
+use firmware_sim::qemu::{QemuDevice, QemuError, image_path, require_qemu};
+use ray_runtime::{PixelPoint, RayBlob};
+use serde::Serialize;
+use std::collections::HashMap;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::Path;
+
+/// The answers of one device beside those of the host.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct DeviceCheck {
+    /// What the device calls itself.
+    pub device: String,
+    /// Matches asked.
+    pub matches: usize,
+    /// Matches that gave a point.
+    pub points: usize,
+    /// Answers that are not those of the host, bit by bit.
+    pub different: usize,
+}
+
+/// Any free port, reachable from this machine alone.
+const ANY_PORT: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
+
+/// Starts the simulated device with `blob` in its flash and compares it with the host.
+///
+/// # Errors
+/// [`DemoError`] if it cannot be started or asked.
+pub fn check_simulated(blob: &[u8], pairs: &[Pair]) -> Result<DeviceCheck, DemoError> {
+    let device = SimulatedDevice::start(ANY_PORT, blob).map_err(DemoError::Start)?;
+    Ok(check(device.address(), &RayBlob::open(blob)?, pairs)?)
+}
+
+/// The same with the Cortex-M image in QEMU, if there is QEMU and the image has been built.
+///
+/// # Errors
+/// In words, why this machine has no such device, and what to do about it.
+pub fn check_cortex_m(blob: &[u8], file: &Path, pairs: &[Pair]) -> Result<DeviceCheck, String> {
+    require_qemu().map_err(|error| error.to_string())?;
+    let image = image_path("device");
+    if !image.is_file() {
+        return Err(
+            "the image is not built: scripts/install-embedded.sh, then firmware-sim qemu, once"
+                .to_owned(),
+        );
+    }
+    let stopped = |error: QemuError| error.to_string();
+    let device = QemuDevice::start(ANY_PORT, &image, Some(file)).map_err(stopped)?;
+    let blob = RayBlob::open(blob).map_err(|error| error.to_string())?;
+    check(device.address(), &blob, pairs).map_err(|error| error.to_string())
+}
+
+/// Asks the device at `address` for every match and compares its answers with those of `blob`.
+///
+/// # Errors
+/// [`ClientError`].
+pub fn check(
+    address: SocketAddr,
+    blob: &RayBlob<'_>,
+    pairs: &[Pair],
+) -> Result<DeviceCheck, ClientError> {
+    let mut client = DeviceClient::connect(&format!("tcp:{address}"))?;
+    let matches: Vec<Match> = (0..)
+        .zip(pairs)
+        .map(|(id, [first, second])| Match {
+            id,
+            first: on_wire(*first),
+            second: on_wire(*second),
+        })
+        .collect();
+    let answers = client.measure(&matches)?;
+    let different = answers
+        .iter()
+        .zip(pairs)
+        .filter(|(answer, pair)| bits(&answer.outcome) != bits(&on_host(blob, pair)))
+        .count();
+    Ok(DeviceCheck {
+        device: client.hello()?.device.to_string(),
+        matches: answers.len(),
+        points: answers.iter().filter(|a| a.outcome.is_ok()).count(),
+        different,
+    })
+}
+
+/// A device has 256 cameras at most, and so does a blob.
+fn on_wire((camera_idx, [u_px, v_px]): Sighting<f32>) -> firmware_sim::protocol::Sighting {
+    firmware_sim::protocol::Sighting {
+        camera: u8::try_from(camera_idx).unwrap_or(u8::MAX),
+        u_px,
+        v_px,
+    }
+}
+
+fn on_host(blob: &RayBlob<'_>, pair: &Pair) -> Result<Point, u8> {
+    let [first, second] = pair.map(|(camera_idx, [u, v])| (camera_idx, PixelPoint::new(u, v)));
+    match blob.triangulate(first, second) {
+        Ok(found) => Ok(Point {
+            point_mm: found.point_mm.into(),
+            gap_squared_mm2: found.gap_squared_mm2,
+        }),
+        Err(error) => Err(error.code()),
+    }
+}
+
+fn bits(outcome: &Result<Point, u8>) -> Result<[u32; 4], u8> {
+    outcome.map(|point| {
+        let [x, y, z] = point.point_mm;
+        [x, y, z, point.gap_squared_mm2].map(f32::to_bits)
+    })
+}
+
+/// The corners that the first two cameras both saw, as matches.
+pub fn corner_pairs(calibration: &Calibration) -> Vec<Pair> {
+    let seen = |camera_idx: usize| {
+        let corners = calibration.corners.iter();
+        corners
+            .filter(move |corner| corner.camera_idx == camera_idx)
+            .map(|corner| {
+                let pixel = [corner.observed.u as f32, corner.observed.v as f32];
+                ((corner.pose, corner.row, corner.col), pixel)
+            })
+    };
+    let second: HashMap<_, _> = seen(1).collect();
+    seen(0)
+        .filter_map(|(label, pixel)| Some([(0, pixel), (1, *second.get(&label)?)]))
+        .collect()
+}

@@ -1,0 +1,65 @@
+//! What the demo measures with a calibration once it is packed: the device's own code on boards
+//! that no training pose had, on matches whose truth is known, and on devices, whose answers must
+//! be those of the host to the last bit.
+
+pub mod device;
+pub mod known;
+pub mod page;
+pub mod unseen;
+pub mod words;
+
+use firmware_sim::client::ClientError;
+use ray_runtime::OpenError;
+use serde::Serialize;
+use std::path::PathBuf;
+
+pub use device::DeviceCheck;
+pub use known::KnownPoints;
+pub use unseen::UnseenBoards;
+
+/// Everything measured on one dataset.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Measured {
+    /// Held-out boards, each fold through a blob of its own; none if the dataset has too few
+    /// poses, or one camera.
+    pub unseen_boards: Option<UnseenBoards>,
+    /// Files of matches whose truth is known; empty for a real recording.
+    pub known_points: Vec<KnownPoints>,
+    /// The same matches on devices.
+    pub devices: Vec<DeviceCheck>,
+    /// Why there is no Cortex-M among them.
+    pub no_cortex_m: Option<String>,
+}
+
+/// Why the demo cannot measure.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DemoError {
+    /// The blob just packed does not open.
+    #[error("the runtime refuses the blob just packed: {0}")]
+    Open(#[from] OpenError),
+    /// The table of true points cannot be read.
+    #[error("{}: is no table of true points", file.display())]
+    Truth {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong.
+        source: csv::Error,
+    },
+    /// The table of true points does not go with its matches.
+    #[error("{}: has {have} rows, its matches {need}", file.display())]
+    TruthCount {
+        /// The file.
+        file: PathBuf,
+        /// Rows.
+        have: usize,
+        /// Matches.
+        need: usize,
+    },
+    /// The simulated device cannot listen.
+    #[error("the simulated device cannot be started")]
+    Start(#[source] std::io::Error),
+    /// The simulated device does not answer.
+    #[error("the simulated device does not answer")]
+    Device(#[from] ClientError),
+}

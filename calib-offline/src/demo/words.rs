@@ -1,0 +1,71 @@
+//! What was measured, line by line: for the terminal and for the page.
+
+use super::{DeviceCheck, KnownPoints, Measured, UnseenBoards};
+use crate::report::text::short;
+
+/// Name and fact, one pair per line.
+pub fn lines(measured: &Measured) -> Vec<(String, String)> {
+    let mut lines = Vec::new();
+    if let Some(unseen) = &measured.unseen_boards {
+        lines.push(("unseen boards".to_owned(), of_unseen(unseen)));
+    }
+    for known in &measured.known_points {
+        lines.push((known.file.clone(), of_known(known)));
+    }
+    for device in &measured.devices {
+        lines.push(("device".to_owned(), of_device(device)));
+    }
+    if let Some(reason) = &measured.no_cortex_m {
+        lines.push(("device".to_owned(), format!("no Cortex-M: {reason}")));
+    }
+    lines
+}
+
+fn of_unseen(unseen: &UnseenBoards) -> String {
+    let unmet = match unseen.unmet {
+        0 => String::new(),
+        count => format!(", {count} with rays that do not meet"),
+    };
+    format!(
+        "{} % RMS, {} % median of the {} mm square between neighboring corners ({} mm RMS), \
+         {} mm RMS from the rigid board; {} points, {} outside{unmet}; {} folds by pose, each \
+         measured by the runtime (f32) from a blob of its own",
+        short(unseen.neighbor_rms_percent),
+        short(unseen.neighbor_median_percent),
+        unseen.square_mm,
+        short(unseen.neighbor_rms_mm),
+        short(unseen.rigid_rms_mm),
+        unseen.points,
+        unseen.outside,
+        unseen.folds,
+    )
+}
+
+fn of_known(known: &KnownPoints) -> String {
+    let Some(errors) = &known.errors else {
+        return format!("none of {} matches could be compared", known.matches);
+    };
+    format!(
+        "{} mm RMS from the truth in the datum frame ({:.3} of the oracle's {} mm), {} mm after \
+         the best rigid placement ({:.3}); {} of {} matches have a point, measured by the \
+         runtime (f32)",
+        short(errors.direct_rms_mm),
+        errors.direct_ratio,
+        short(errors.oracle_rms_mm),
+        short(errors.placed_rms_mm),
+        errors.placed_ratio,
+        errors.points,
+        known.matches,
+    )
+}
+
+fn of_device(check: &DeviceCheck) -> String {
+    let verdict = match check.different {
+        0 => "the host's bits in every answer".to_owned(),
+        count => format!("{count} answers DIFFER from the host's"),
+    };
+    format!(
+        "{}: {} matches, {} points, {verdict}",
+        check.device, check.matches, check.points
+    )
+}

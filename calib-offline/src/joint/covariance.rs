@@ -1,0 +1,245 @@
+//! How well each ray is known after the estimate, and where the noise of a pixel takes it.
+
+use super::estimate::{Estimate, EstimateError};
+use crate::adjust::covariance::{Sighting, sighting_covariance};
+use crate::field::uncertainty::{PairUncertainty, node_pixel, packed};
+use crate::field::{CalibratedCamera, Rig, transport};
+use crate::geometry::so3::skew;
+use crate::geometry::{PixelPoint, Ray, midpoint_by_shifts};
+use nalgebra::{DMatrix, Matrix2, Matrix3x2, Matrix4, Vector3};
+
+/// Nodes of a grid along the longer side of the sensor.
+const NODES_ALONG_LONGER_SIDE: usize = 11;
+/// Singular values below this count as zero: a rigid motion that moves no point (mm per rad or mm).
+const RIGID_RANK_SHARE: f64 = 1e-9;
+
+impl Estimate {
+    /// Fills in how well the pairs of a rig (made by [`Estimate::rig`]) know their rays (METHOD 5).
+    ///
+    /// Both cameras of a pair are asked where they see a point at the working distance that is
+    /// fixed in the datum frame. What a rigid motion of the whole rig explains is taken out, as it
+    /// changes no measured shape: so this is not the uncertainty of the datum itself.
+    ///
+    /// Cameras that never see the same point at the working distance get no entry.
+    ///
+    /// # Errors
+    /// [`EstimateError::Singular`] if the data leave a parameter open.
+    pub fn fill_uncertainty(&mut self, rig: &mut Rig) -> Result<(), EstimateError> {
+        let (layout, equations, reduced) = self.fit.equations(&self.observations)?;
+        let distance_mm = self.working_distance_mm(rig);
+        let mut all = Vec::new();
+        for second in 1..rig.cameras.len() {
+            let pair = [&rig.cameras[0], &rig.cameras[second]];
+            let (nodes_u, nodes_v) = node_counts(pair[0]);
+            let Some(nodes) = nodes([0, second], pair, distance_mm) else {
+                continue;
+            };
+            let sightings: Vec<Sighting> =
+                nodes.iter().flatten().map(|node| node.sighting).collect();
+            // The datum is the first pose.
+            let covariance =
+                sighting_covariance(&self.model, &layout, &equations, &reduced, 0, &sightings);
+            let Some((covariance, by_point)) = covariance else {
+                continue;
+            };
+            let Some(covariance) = without_rigid_motions(&covariance, &by_point, &nodes) else {
+                continue;
+            };
+            let pixel_noise = Matrix4::identity() * self.noise.variance_px2;
+            let (calibration, noise) = nodes
+                .iter()
+                .enumerate()
+                .map(|(k, [a, b])| {
+                    let mut rad_per_px = Matrix4::zeros();
+                    rad_per_px
+                        .fixed_view_mut::<2, 2>(0, 0)
+                        .copy_from(&(a.mm_per_px / a.distance_mm));
+                    rad_per_px
+                        .fixed_view_mut::<2, 2>(2, 2)
+                        .copy_from(&(b.mm_per_px / b.distance_mm));
+                    let carry =
+                        |px2: Matrix4<f64>| packed(&(rad_per_px * px2 * rad_per_px.transpose()));
+                    let own = covariance.fixed_view::<4, 4>(4 * k, 4 * k).into_owned();
+                    (carry(own), carry(pixel_noise))
+                })
+                .unzip();
+            all.push(PairUncertainty {
+                first: 0,
+                second,
+                sensor: pair[0].field.sensor,
+                nodes_u,
+                nodes_v,
+                calibration,
+                noise,
+            });
+        }
+        rig.uncertainty = all;
+        Ok(())
+    }
+
+    /// Median distance from the first camera to the boards, mm.
+    fn working_distance_mm(&self, rig: &Rig) -> f64 {
+        let center = self.observations.board.center_in_board();
+        let mut distances: Vec<f64> = self
+            .rig_from_board()
+            .iter()
+            .map(|pose| {
+                (pose.point(&center) - rig.cameras[0].rig_from_camera.translation_mm).norm()
+            })
+            .collect();
+        distances.sort_by(f64::total_cmp);
+        distances.get(distances.len() / 2).copied().unwrap_or(1.0)
+    }
+}
+
+/// A camera's part in a node.
+#[derive(Clone, Copy)]
+struct Node {
+    sighting: Sighting,
+    /// Rig frame.
+    ray: Ray,
+    /// The two axes across the ray, rig frame.
+    axes: Matrix3x2<f64>,
+    /// Shift of the ray along its axes, at the point, per px.
+    mm_per_px: Matrix2<f64>,
+    /// Distance of the point along the ray, mm.
+    distance_mm: f64,
+    /// Whether it is the nearest measured place, in place of a node that is not measured.
+    stands_in: bool,
+}
+
+fn node_counts(camera: &CalibratedCamera) -> (usize, usize) {
+    let sensor = camera.field.sensor;
+    let longer = f64::from(sensor.width.max(sensor.height));
+    let count = |extent: u32| {
+        ((NODES_ALONG_LONGER_SIDE as f64 * f64::from(extent) / longer).round() as usize).max(2)
+    };
+    (count(sensor.width), count(sensor.height))
+}
+
+/// The nodes of a pair, row-major over the first camera. A node whose point the pair does not
+/// measure takes the value of the nearest place where it does, so that interpolation inside is not
+/// spoilt by extrapolation outside. `None` if there is no such place.
+fn nodes(
+    indices: [usize; 2],
+    pair: [&CalibratedCamera; 2],
+    distance_mm: f64,
+) -> Option<Vec<[Node; 2]>> {
+    let (nodes_u, nodes_v) = node_counts(pair[0]);
+    let see_both = |pixel: PixelPoint| {
+        let ray = pair[0].ray_in_rig(pixel)?;
+        let point_in_rig = ray.origin_mm + ray.direction.normalize() * distance_mm;
+        let camera_from_rig = pair[1].rig_from_camera.inverse();
+        let other = pair[1]
+            .field
+            .project(&camera_from_rig.point(&point_in_rig))?;
+        if !pair[1].coverage.contains(other) {
+            return None;
+        }
+        Some([
+            node(indices[0], pair[0], pixel, point_in_rig),
+            node(indices[1], pair[1], other, point_in_rig),
+        ])
+    };
+    let measured: Vec<(PixelPoint, [Node; 2])> = covered_cells(pair[0])
+        .into_iter()
+        .filter_map(|pixel| Some((pixel, see_both(pixel)?)))
+        .collect();
+    let sensor = pair[0].field.sensor;
+    (0..nodes_u * nodes_v)
+        .map(|k| {
+            let pixel = node_pixel(sensor, nodes_u, nodes_v, k % nodes_u, k / nodes_u);
+            see_both(pixel).or_else(|| {
+                measured
+                    .iter()
+                    .min_by(|a, b| a.0.distance_px(pixel).total_cmp(&b.0.distance_px(pixel)))
+                    .map(|(_, nodes)| {
+                        nodes.map(|node| Node {
+                            stands_in: true,
+                            ..node
+                        })
+                    })
+            })
+        })
+        .collect()
+}
+
+fn node(
+    camera_idx: usize,
+    camera: &CalibratedCamera,
+    pixel: PixelPoint,
+    point_in_rig: Vector3<f64>,
+) -> Node {
+    let sample = camera.field.sample(pixel);
+    let point_in_camera = camera.rig_from_camera.inverse().point(&point_in_rig);
+    let local = transport::frame(&sample.s).tr_mul(&point_in_camera);
+    let by_s = transport::local_point_derivative(&sample.s, &local);
+    let mm_per_px = by_s.fixed_rows::<2>(0) * sample.ds - sample.dm;
+    Node {
+        sighting: Sighting {
+            camera_idx,
+            pixel,
+            point_in_board: point_in_rig,
+        },
+        ray: sample.ray().transformed(&camera.rig_from_camera),
+        axes: camera.rig_from_camera.rotation * transport::across(&sample.s),
+        mm_per_px,
+        distance_mm: local.z,
+        stands_in: false,
+    }
+}
+
+/// Middles of the calibrated cells.
+fn covered_cells(camera: &CalibratedCamera) -> Vec<PixelPoint> {
+    let mask = &camera.coverage;
+    let (width_px, height_px) = mask.cell_size_px();
+    (0..mask.cells_u * mask.cells_v)
+        .filter(|cell| mask.covered[*cell])
+        .map(|cell| {
+            PixelPoint::new(
+                ((cell % mask.cells_u) as f64 + 0.5) * width_px - 0.5,
+                ((cell / mask.cells_u) as f64 + 0.5) * height_px - 0.5,
+            )
+        })
+        .collect()
+}
+
+/// What remains of the covariance when the best rigid motion of all measured points is taken out.
+///
+/// Points move by `T r` with the predictions r, a rigid motion `a` changes predictions by `R a`;
+/// the motion that fits best in mm is `a = (T R)^+ T r`, so `r - R a` remains.
+fn without_rigid_motions(
+    covariance: &DMatrix<f64>,
+    by_point: &DMatrix<f64>,
+    nodes: &[[Node; 2]],
+) -> Option<DMatrix<f64>> {
+    let count = covariance.nrows();
+    let mut motions = DMatrix::zeros(count, 6);
+    for (k, node) in nodes.iter().flatten().enumerate() {
+        let by = by_point.fixed_view::<2, 3>(2 * k, 0);
+        motions
+            .view_mut((2 * k, 0), (2, 3))
+            .copy_from(&(-by * skew(&node.sighting.point_in_board)));
+        motions.view_mut((2 * k, 3), (2, 3)).copy_from(&by);
+    }
+    let mut to_points = DMatrix::zeros(3 * nodes.len(), count);
+    for (k, [a, b]) in nodes.iter().enumerate() {
+        let (by_a, by_b) = midpoint_by_shifts(&a.ray, &b.ray)?;
+        to_points
+            .view_mut((3 * k, 4 * k), (3, 2))
+            .copy_from(&(by_a * a.axes * a.mm_per_px));
+        to_points
+            .view_mut((3 * k, 4 * k + 2), (3, 2))
+            .copy_from(&(by_b * b.axes * b.mm_per_px));
+    }
+    // Only points that are measured say where the rig moved to.
+    for (k, [a, _]) in nodes.iter().enumerate() {
+        if a.stands_in {
+            to_points.rows_mut(3 * k, 3).fill(0.0);
+        }
+    }
+    let moved = &to_points * &motions;
+    let best_motion = moved.pseudo_inverse(RIGID_RANK_SHARE).ok()? * to_points;
+    let projector = DMatrix::identity(count, count) - motions * best_motion;
+    Some(&projector * covariance * projector.transpose())
+}
