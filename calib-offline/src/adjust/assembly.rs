@@ -11,8 +11,9 @@ use super::knots::KnotOrder;
 use super::model::{CameraModel, Model};
 use super::observations::{Observations, ViewBasis, ViewBlock};
 use super::residual::{Linearization, linearize};
+use crate::field::spline::AxisWeights;
 use crate::geometry::so3::skew;
-use nalgebra::{DMatrix, Vector2, Vector3};
+use nalgebra::{DMatrix, DMatrixView, Dyn, Vector2, Vector3};
 
 /// Columns of the pose and of the extrinsics among a view's small columns; the board's terms and
 /// the gradient follow.
@@ -101,15 +102,15 @@ impl Components {
 
 /// What one view contributes.
 pub struct ViewSums {
-    /// Field by field: columns by component, see [`Components`].
+    /// Field by field, lower triangle: columns by component, see [`Components`].
     pub field: DMatrix<f64>,
     /// Field by the small columns: pose 6, extrinsics 6, board, gradient.
     pub field_small: DMatrix<f64>,
     /// The small columns by themselves.
     pub small: DMatrix<f64>,
-    /// Per corner and pair of components (a <= b, row by row): `w j_a . j_b`.
+    /// Per pair of components (a <= b, row by row; rows) and corner (columns): `w j_a . j_b`.
     pairs: DMatrix<f64>,
-    /// Per component, corner and small column: `w j_a . column`.
+    /// Per component: small column (rows) by corner (columns), `w j_a . column`.
     crossed: Vec<DMatrix<f64>>,
 }
 
@@ -132,15 +133,16 @@ pub fn view_sums(
     let count = components.count();
     let small_len = BOARD + model.board_shape.terms.len() + 1;
     let n = view.corners.len();
-    let mut pairs = DMatrix::zeros(n, count * (count + 1) / 2);
-    let mut crossed = vec![DMatrix::zeros(n, small_len); count];
+    let mut pairs = DMatrix::zeros(count * (count + 1) / 2, n);
+    let mut crossed = vec![DMatrix::zeros(small_len, n); count];
     let mut small = DMatrix::zeros(small_len, small_len);
+    let mut row = vec![Vector2::zeros(); small_len];
     for (idx, seen) in predict(model, observations, view, basis).enumerate() {
         let weight = weights[idx];
         let Some(l) = seen.linearization.as_ref().filter(|_| weight > 0.0) else {
             continue;
         };
-        let row = small_columns(model, observations, view, idx, &seen, l);
+        fill_small_columns(model, observations, view, idx, &seen, l, &mut row);
         let j: [Vector2<f64>; 4] = [
             l.by_s.column(0).into(),
             l.by_s.column(1).into(),
@@ -149,39 +151,50 @@ pub fn view_sums(
         ];
         for a in 0..count {
             for b in a..count {
-                pairs[(idx, pair(count, a, b))] = weight * j[a].dot(&j[b]);
+                pairs[(pair(count, a, b), idx)] = weight * j[a].dot(&j[b]);
             }
-            for (column, value) in row.iter().enumerate() {
-                crossed[a][(idx, column)] = weight * j[a].dot(value);
+            let weighted = j[a] * weight;
+            for (entry, value) in crossed[a].column_mut(idx).iter_mut().zip(&row) {
+                *entry = weighted.dot(value);
             }
         }
-        for (column, value) in row.iter().enumerate() {
-            for (other, other_value) in row[..=column].iter().enumerate() {
-                small[(other, column)] += weight * value.dot(other_value);
+        for (k, value) in row.iter().enumerate() {
+            let weighted = value * weight;
+            for (entry, other) in small.column_mut(k).iter_mut().zip(&row[..=k]) {
+                *entry += weighted.dot(other);
             }
         }
     }
     small.fill_lower_triangle_with_upper_triangle();
     let mut field = DMatrix::zeros(components.len(), components.len());
     let mut field_small = DMatrix::zeros(components.len(), small_len);
-    for (a, crossed_a) in crossed.iter().enumerate() {
-        let products_a = basis.products.columns(0, components.terms(a));
-        let rows = (components.start(a), components.terms(a));
-        field_small
-            .rows_mut(rows.0, rows.1)
-            .gemm_tr(1.0, &products_a, crossed_a, 0.0);
-        for b in a..count {
-            let mut scaled = basis.products.columns(0, components.terms(b)).into_owned();
-            let weights = pairs.column(pair(count, a, b));
-            for mut column in scaled.column_iter_mut() {
-                column.component_mul_assign(&weights);
+    let mut scaled = DMatrix::zeros(basis.products().nrows(), n);
+    for (a, crossed) in crossed.iter().enumerate() {
+        let (start, terms) = (components.start(a), components.terms(a));
+        let products = basis.products().rows(0, terms);
+        field_small.rows_mut(start, terms).gemm(
+            1.0,
+            &products,
+            &transposed(crossed, small_len),
+            0.0,
+        );
+        for b in 0..=a {
+            let other_terms = components.terms(b);
+            for (c, (mut column, source)) in scaled
+                .column_iter_mut()
+                .zip(basis.products().column_iter())
+                .enumerate()
+            {
+                let weight = pairs[(pair(count, b, a), c)];
+                for (entry, product) in column.iter_mut().zip(source.iter()).take(other_terms) {
+                    *entry = weight * product;
+                }
             }
             field
-                .view_mut((rows.0, components.start(b)), (rows.1, components.terms(b)))
-                .gemm_tr(1.0, &products_a, &scaled, 0.0);
+                .view_mut((start, components.start(b)), (terms, other_terms))
+                .gemm(1.0, &products, &transposed(&scaled, other_terms), 0.0);
         }
     }
-    field.fill_lower_triangle_with_upper_triangle();
     ViewSums {
         field,
         field_small,
@@ -191,15 +204,21 @@ pub fn view_sums(
     }
 }
 
+/// The transpose of the first rows, without copying.
+fn transposed(matrix: &DMatrix<f64>, rows: usize) -> DMatrixView<'_, f64, Dyn, Dyn> {
+    DMatrixView::from_slice_with_strides(matrix.as_slice(), matrix.ncols(), rows, matrix.nrows(), 1)
+}
+
 /// Derivatives of a corner's residual by pose, extrinsics and board shape, and the residual.
-fn small_columns(
+fn fill_small_columns(
     model: &Model,
     observations: &Observations,
     view: &ViewBlock,
     corner_idx: usize,
     seen: &Seen,
     l: &Linearization,
-) -> Vec<Vector2<f64>> {
+    row: &mut [Vector2<f64>],
+) {
     let camera = &model.cameras[view.camera_idx];
     let pose = &model.rig_from_board[view.pose_idx];
     let by_rig = l.by_point * camera.camera_from_rig.rotation;
@@ -207,33 +226,45 @@ fn small_columns(
     let by_pose_turn = -by_rig * skew(&seen.turned_in_board);
     let by_camera_turn = -l.by_point * skew(&seen.turned_in_rig);
     let corner = &view.corners[corner_idx].point_in_board;
-    [by_pose_turn, by_rig, by_camera_turn, l.by_point]
-        .iter()
-        .flat_map(|block| block.column_iter().map(Into::into).collect::<Vec<_>>())
-        .chain(
-            model
-                .board_shape
-                .products(&observations.board, corner)
-                .map(|product| by_height * product),
-        )
-        .chain([l.residual_px])
-        .collect()
+    let blocks = [by_pose_turn, by_rig, by_camera_turn, l.by_point];
+    for (target, block) in row.chunks_exact_mut(3).zip(&blocks) {
+        for (entry, column) in target.iter_mut().zip(block.column_iter()) {
+            *entry = column.into();
+        }
+    }
+    let products = model.board_shape.products(&observations.board, corner);
+    for (entry, product) in row[BOARD..].iter_mut().zip(products) {
+        *entry = by_height * product;
+    }
+    if let Some(last) = row.last_mut() {
+        *last = l.residual_px;
+    }
 }
 
 /// What all views of one camera contribute to the equations of its spline.
 pub struct SplineSums {
     /// Knot by knot, in knot order.
     pub band: BandedMatrix,
-    /// Knots (rows, row-major) by all columns that they are coupled to: the field's polynomials,
-    /// extrinsics 6, board, then 6 for each of the camera's views in order, then the gradient.
+    /// Knots (rows, row-major) by all columns that they are coupled to: the field's polynomials
+    /// ([`Components`]), extrinsics 6, board, gradient, then 6 for each of the views in order.
     pub border: Vec<f64>,
-    /// Number of those columns.
-    pub border_len: usize,
+    /// Per border column, the number of leading rows that are zero, in rising order.
+    pub begins: Vec<usize>,
 }
 
-/// Sums over the views of one camera, given in order with their [`ViewSums`].
+/// The first row of a spline's equations that a view touches.
+pub fn first_row(order: &KnotOrder, basis: &ViewBasis) -> usize {
+    basis
+        .knots
+        .iter()
+        .map(|(u, v)| 2 * order.place(u.first, v.first))
+        .min()
+        .unwrap_or(0)
+}
+
+/// Sums over the views of one camera, given with their [`ViewSums`] by rising [`first_row`].
 ///
-/// Cost per corner: `32 (2 F + 20) + 3 * 136` multiplications, F the number of polynomial columns.
+/// Cost per corner: `32 (F + 20) + 4 * 136` multiplications, F the number of polynomial columns.
 pub fn spline_sums(
     camera: &CameraModel,
     order: &KnotOrder,
@@ -242,78 +273,131 @@ pub fn spline_sums(
     let components = Components::of(camera);
     let count = components.count();
     let field_len = components.len();
-    let fixed_small = views
+    let small_len = views
         .first()
-        .map_or(0, |(_, sums)| sums.small.ncols() - EXTRINSICS - 1);
-    let border_len = field_len + fixed_small + 6 * views.len() + 1;
+        .map_or(EXTRINSICS, |(_, sums)| sums.small.ncols());
+    let shared_len = field_len + small_len - EXTRINSICS;
+    let mut begins = vec![0; shared_len];
+    for (basis, _) in views {
+        begins.extend([first_row(order, basis); 6]);
+    }
+    let border_len = begins.len();
     let rows = 2 * order.knot_count();
     let mut band = BandedMatrix::zeros(rows, order.half_bandwidth());
     let mut border = vec![0.0; rows * border_len];
     // The part of a row that every view of the camera shares, for each of the two components.
-    let mut shared = [
-        vec![0.0; field_len + fixed_small],
-        vec![0.0; field_len + fixed_small],
-    ];
+    let mut shared = [vec![0.0; shared_len], vec![0.0; shared_len]];
     for (view_idx, (basis, sums)) in views.iter().enumerate() {
-        let pose_start = field_len + fixed_small + 6 * view_idx;
-        let gradient = sums.small.ncols() - 1;
+        let pose_start = shared_len + 6 * view_idx;
         for (corner_idx, (u, v)) in basis.knots.iter().enumerate() {
-            if sums.pairs[(corner_idx, 0)] == 0.0 {
+            let weight = |a: usize, b: usize| sums.pairs[(pair(count, a, b), corner_idx)];
+            if weight(0, 0) == 0.0 {
                 continue;
             }
+            let products = column(basis.products(), corner_idx);
+            let crossed = [0, 1].map(|a| column(&sums.crossed[a], corner_idx));
             for (a, shared) in shared.iter_mut().enumerate() {
                 for c in 0..count {
-                    let weight = sums.pairs[(corner_idx, pair(count, a, c))];
+                    let weight = weight(a, c);
                     let start = components.start(c);
-                    for k in 0..components.terms(c) {
-                        shared[start + k] = weight * basis.products[(corner_idx, k)];
+                    let target = &mut shared[start..start + components.terms(c)];
+                    for (entry, product) in target.iter_mut().zip(products) {
+                        *entry = weight * product;
                     }
                 }
-                for k in 0..fixed_small {
-                    shared[field_len + k] = sums.crossed[a][(corner_idx, EXTRINSICS + k)];
-                }
+                shared[field_len..].copy_from_slice(&crossed[a][EXTRINSICS..]);
             }
-            let mut places = [(0, 0.0); 16];
-            for j in 0..4 {
-                for i in 0..4 {
-                    places[4 * j + i] = (
-                        order.place(u.first + i, v.first + j),
-                        u.value[i] * v.value[j],
-                    );
-                }
-            }
-            for (place, value) in places {
+            let touched = Touched::new(order, u, v);
+            for (place, value) in touched.knots() {
                 for (a, shared) in shared.iter().enumerate() {
                     let row = &mut border[(2 * place + a) * border_len..][..border_len];
                     for (entry, shared) in row.iter_mut().zip(shared) {
                         *entry += value * shared;
                     }
-                    for k in 0..6 {
-                        row[pose_start + k] += value * sums.crossed[a][(corner_idx, POSE + k)];
-                    }
-                    row[border_len - 1] += value * sums.crossed[a][(corner_idx, gradient)];
-                }
-                for (other, other_value) in places {
-                    if other > place {
-                        continue;
-                    }
-                    let both = value * other_value;
-                    for a in 0..2 {
-                        for b in 0..2 {
-                            if other == place && b > a {
-                                continue;
-                            }
-                            let weight = sums.pairs[(corner_idx, pair(count, a, b))];
-                            band.add(2 * place + a, 2 * other + b, both * weight);
-                        }
+                    for (entry, crossed) in row[pose_start..pose_start + 6]
+                        .iter_mut()
+                        .zip(&crossed[a][POSE..])
+                    {
+                        *entry += value * crossed;
                     }
                 }
             }
+            touched.add_to(
+                &mut band,
+                [[weight(0, 0), weight(0, 1)], [weight(0, 1), weight(1, 1)]],
+            );
         }
     }
     SplineSums {
         band,
         border,
-        border_len,
+        begins,
+    }
+}
+
+fn column(matrix: &DMatrix<f64>, idx: usize) -> &[f64] {
+    &matrix.as_slice()[idx * matrix.nrows()..][..matrix.nrows()]
+}
+
+/// The 16 knots that a pixel touches: 4 runs of 4 knots whose places follow each other.
+struct Touched {
+    first: [usize; 4],
+    value: [[f64; 4]; 4],
+}
+
+impl Touched {
+    fn new(order: &KnotOrder, u: &AxisWeights, v: &AxisWeights) -> Self {
+        let u_is_longer = order.place(u.first, v.first + 1) == order.place(u.first, v.first) + 1;
+        let (across, along) = if u_is_longer { (u, v) } else { (v, u) };
+        Self {
+            first: [0, 1, 2, 3].map(|k| {
+                if u_is_longer {
+                    order.place(u.first + k, v.first)
+                } else {
+                    order.place(u.first, v.first + k)
+                }
+            }),
+            value: across.value.map(|a| along.value.map(|b| a * b)),
+        }
+    }
+
+    /// Places and weights, by rising place.
+    fn knots(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.first
+            .iter()
+            .zip(&self.value)
+            .flat_map(|(first, values)| (0..4).map(move |k| (first + k, values[k])))
+    }
+
+    /// Adds `weight[a][b]` times the product of two knots' weights for each two components a, b of
+    /// each two knots.
+    fn add_to(&self, band: &mut BandedMatrix, weight: [[f64; 2]; 2]) {
+        for (a, weight) in weight.iter().enumerate() {
+            // What stands in the columns of each run, but for the weight of the row's knot.
+            let runs = self.value.map(|values| {
+                let mut run = [0.0; 8];
+                for (pair, value) in run.chunks_exact_mut(2).zip(values) {
+                    pair[0] = value * weight[0];
+                    pair[1] = value * weight[1];
+                }
+                run
+            });
+            for (i, values) in self.value.iter().enumerate() {
+                for (k, value) in values.iter().enumerate() {
+                    let row = 2 * (self.first[i] + k) + a;
+                    for (first, run) in self.first[..i].iter().zip(&runs) {
+                        let entries = band.row_from_mut(row, 2 * first);
+                        for (entry, other) in entries[..8].iter_mut().zip(run) {
+                            *entry += value * other;
+                        }
+                    }
+                    // Up to the diagonal.
+                    let entries = band.row_from_mut(row, 2 * self.first[i]);
+                    for (entry, other) in entries.iter_mut().zip(&runs[i]) {
+                        *entry += value * other;
+                    }
+                }
+            }
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Covariance of what a model predicts: where cameras see points, given what they were fitted to.
 
 use super::assembly::Components;
+use super::cholesky::gram;
 use super::model::{Layout, Model};
 use super::normal_equations::{Eliminated, NormalEquations, Reduced, parameters_to_columns};
 use super::residual::linearize;
@@ -54,7 +55,7 @@ pub fn sighting_covariance(
             .copy_from(&form.by_point);
     }
     let mut covariance = DMatrix::zeros(count, count);
-    let border_len = reduced.border.l_dirty().nrows();
+    let border_len = reduced.global_len + reduced.pose_columns();
     let mut border = DMatrix::zeros(border_len, count);
     for (k, form) in forms.iter().enumerate() {
         for component in 0..2 {
@@ -74,7 +75,7 @@ pub fn sighting_covariance(
             }
             border -= &equations.coupling[pose_idx] * factor.solve(&own);
             factor.l_dirty().solve_lower_triangular_mut(&mut own);
-            covariance += own.tr_mul(&own);
+            covariance += own.transpose() * &own;
         }
         Eliminated::Splines(splines) => {
             for (k, form) in forms.iter().enumerate() {
@@ -88,35 +89,34 @@ pub fn sighting_covariance(
                 }
             }
             for (camera_idx, spline) in splines.iter().enumerate() {
-                let Some((columns, spline)) = spline else {
+                let Some(spline) = spline else {
                     continue;
                 };
                 let own: Vec<usize> = (0..forms.len())
                     .filter(|k| sightings[*k].camera_idx == camera_idx)
                     .collect();
-                let rows = spline.y_transposed.ncols();
-                let mut knots = vec![0.0; rows * 2 * own.len()];
+                if own.is_empty() {
+                    continue;
+                }
+                let columns = 2 * own.len();
+                let mut knots = vec![0.0; spline.row_count() * columns];
                 for (at, k) in own.iter().enumerate() {
                     for (place, values) in &forms[*k].knots {
                         for (a, by_component) in values.iter().enumerate() {
                             for (component, value) in by_component.iter().enumerate() {
-                                knots[(2 * place + a) * 2 * own.len() + 2 * at + component] +=
-                                    value;
+                                knots[(2 * place + a) * columns + 2 * at + component] += value;
                             }
                         }
                     }
                 }
-                spline.factor.solve_lower(&mut knots, 2 * own.len());
-                // Row-major storage read column by column is the transpose.
-                let solved_transposed = DMatrix::from_vec(2 * own.len(), rows, knots);
-                let share = &solved_transposed * solved_transposed.transpose();
-                let pulled = &spline.y_transposed * solved_transposed.transpose();
+                spline.solve_lower(&mut knots, columns);
+                let share = full(gram(&knots, &vec![0; columns]));
+                let pulled = spline.pull(&knots, columns, border_len);
                 for (a, k) in own.iter().enumerate() {
                     for component in 0..2 {
                         let column = 2 * k + component;
-                        for (row, target) in columns.iter().enumerate() {
-                            border[(*target, column)] -= pulled[(row, 2 * a + component)];
-                        }
+                        let mut target = border.column_mut(column);
+                        target -= pulled.column(2 * a + component);
                         for (b, l) in own.iter().enumerate() {
                             for other in 0..2 {
                                 covariance[(column, 2 * l + other)] +=
@@ -128,12 +128,18 @@ pub fn sighting_covariance(
             }
         }
     }
-    reduced
-        .border
-        .l_dirty()
-        .solve_lower_triangular_mut(&mut border);
-    covariance += border.tr_mul(&border);
+    // Column-major storage is the transpose in row-major storage.
+    let mut border = border.transpose();
+    let begins = vec![0; count];
+    reduced.border.solve_lower(border.as_mut_slice(), &begins);
+    covariance += full(gram(border.as_slice(), &begins));
     Some((covariance, by_point))
+}
+
+/// A symmetric matrix from its lower triangle.
+fn full(mut lower: DMatrix<f64>) -> DMatrix<f64> {
+    lower.fill_upper_triangle_with_lower_triangle();
+    lower
 }
 
 fn forms(

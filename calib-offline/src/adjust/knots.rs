@@ -5,6 +5,7 @@
 //! `n` knots along the shorter side (METHOD 2.5). The two components of a knot are neighbors.
 
 use super::banded::BandedMatrix;
+use super::cholesky::BandedCholesky;
 use crate::field::spline::SplineGrid;
 
 /// Keeps the energy positive definite, and linear functions, which have no energy of their own, out
@@ -57,15 +58,29 @@ impl KnotOrder {
     /// Discrete thin-plate energy `D_uu^T D_uu + 2 D_uv^T D_uv + D_vv^T D_vv` (plus a minute
     /// ridge) of each component, METHOD 2.3: second differences of neighboring knots.
     pub fn thin_plate(&self) -> BandedMatrix {
-        let mut energy = BandedMatrix::zeros(2 * self.knot_count(), self.half_bandwidth());
+        self.energy(2)
+    }
+
+    /// Natural logarithm of the determinant of [`Self::thin_plate`].
+    pub fn thin_plate_ln_determinant(&self) -> f64 {
+        // The components do not meet, so one is factorized and counts twice.
+        BandedCholesky::of_banded(&self.energy(1), 1.0)
+            .map_or(0.0, |factor| 2.0 * factor.ln_determinant())
+    }
+
+    /// The energy of interleaved components. Second differences reach two knots each way.
+    fn energy(&self, components: usize) -> BandedMatrix {
         let (nu, nv) = (self.grid.knots_u(), self.grid.knots_v());
+        let half_bandwidth = components * 2 * nu.min(nv).max(2);
+        let mut energy = BandedMatrix::zeros(components * self.knot_count(), half_bandwidth);
         let mut add = |weight: f64, stencil: &[(usize, usize, f64)]| {
             for (i1, j1, c1) in stencil {
                 for (i2, j2, c2) in stencil {
                     let (a, b) = (self.place(*i1, *j1), self.place(*i2, *j2));
                     if a >= b {
-                        for component in 0..2 {
-                            energy.add(2 * a + component, 2 * b + component, weight * c1 * c2);
+                        for component in 0..components {
+                            let (row, column) = (components * a, components * b);
+                            energy.add(row + component, column + component, weight * c1 * c2);
                         }
                     }
                 }
@@ -120,12 +135,26 @@ mod tests {
                     x[2 * order.place(i, j)] = f(i as f64, j as f64);
                 }
             }
+            // What the ridge adds is not curvature.
             energy.times(&x).dot(&x) - RIDGE * x.norm_squared()
         };
         assert!(with(|i, j| 3.0 + i - 2.0 * j).abs() < 1e-9);
         // i^2 / 2 has second difference 1 at 6 interior knots of 7 rows.
         assert!((with(|i, _| i * i / 2.0) - 42.0).abs() < 1e-9);
         assert!(with(|i, j| i * j) > 80.0);
+    }
+
+    #[test]
+    fn the_determinant_is_that_of_both_components() {
+        for (width, height) in [(640, 480), (480, 640)] {
+            let order = KnotOrder::new(SplineGrid::with_spacing(
+                SensorSize::new(width, height),
+                90.0,
+            ));
+            let both = BandedCholesky::of_banded(&order.thin_plate(), 1.0).unwrap();
+            let difference = order.thin_plate_ln_determinant() - both.ln_determinant();
+            assert!(difference.abs() < 1e-9);
+        }
     }
 
     #[test]

@@ -4,14 +4,17 @@
 
 mod assembly;
 pub mod banded;
+pub mod cholesky;
 pub mod covariance;
 pub mod knots;
 pub mod levenberg;
 pub mod model;
 pub mod normal_equations;
 pub mod observations;
+mod product;
 pub mod residual;
 pub mod robust;
+mod spline_block;
 
 pub use levenberg::{Outcome, StopReason};
 pub use model::{CameraModel, Model};

@@ -177,6 +177,20 @@ impl Model {
         next
     }
 
+    /// [`Self::view_bases`], given those of a model that is partly the same.
+    pub fn changed_view_bases(
+        &self,
+        observations: &Observations,
+        known: &[ViewBasis],
+    ) -> Vec<ViewBasis> {
+        observations
+            .views
+            .iter()
+            .zip(known)
+            .map(|(view, basis)| basis.of_changed(view, &self.cameras[view.camera_idx].field))
+            .collect()
+    }
+
     /// The values of the fixed functions at every corner, per view.
     pub fn view_bases(&self, observations: &Observations) -> Vec<ViewBasis> {
         observations

@@ -7,12 +7,14 @@
 //! With splines these are eliminated first: each is banded and coupled to everything else (the
 //! border), METHOD 2.5. Nothing is ever formed that couples knots densely.
 
-use super::assembly::{self, Components, EXTRINSICS, SplineSums, ViewSums, predict};
-use super::banded::{BandedCholesky, BandedMatrix};
+use super::assembly::{self, Components, EXTRINSICS, ViewSums, predict};
+use super::banded::BandedMatrix;
+use super::cholesky::{BandedCholesky, gram};
 use super::model::{CameraModel, Layout, Model, Step};
 use super::observations::{Observations, ViewBasis};
+use super::spline_block::{BorderColumns, EliminatedSpline, SplineBlock};
 use crate::field::polynomial::legendre_norms;
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix6, Vector2, Vector6};
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, Vector2, Vector6};
 use rayon::prelude::*;
 
 /// Inverse variances of the parameters that smoothness or plausibility holds back.
@@ -112,26 +114,38 @@ pub fn cost(
     weights: &Weights,
     priors: &Priors,
 ) -> f64 {
-    let per_view: Vec<f64> = observations
+    let residuals = residuals(model, observations, bases);
+    cost_of_residuals(&residuals, model, observations, weights, priors)
+}
+
+/// [`cost`], given the [`residuals`] of the model.
+pub fn cost_of_residuals(
+    residuals: &[Vec<Option<Vector2<f64>>>],
+    model: &Model,
+    observations: &Observations,
+    weights: &Weights,
+    priors: &Priors,
+) -> f64 {
+    let corners: f64 = observations
         .views
-        .par_iter()
-        .zip(bases)
+        .iter()
+        .zip(residuals)
         .zip(weights)
-        .map(|((view, basis), weights)| {
+        .map(|((view, residuals), weights)| {
             let lost_px = f64::from(observations.sensors[view.camera_idx].width);
-            predict(model, observations, view, basis)
+            residuals
+                .iter()
                 .zip(weights)
-                .map(|(seen, w)| {
-                    let squared = seen
-                        .linearization
-                        .map(|l| l.residual_px.norm_squared())
+                .map(|(residual, w)| {
+                    let squared = residual
+                        .map(|r| r.norm_squared())
                         .filter(|squared| squared.is_finite());
                     w * squared.unwrap_or(lost_px * lost_px)
                 })
-                .sum()
+                .sum::<f64>()
         })
-        .collect();
-    per_view.iter().sum::<f64>() + priors.cost(model)
+        .sum();
+    corners + priors.cost(model)
 }
 
 /// The equations `H step = -gradient` of one linearization, priors included.
@@ -144,17 +158,6 @@ pub struct NormalEquations {
     /// Global x 6 per pose.
     pub(super) coupling: Vec<DMatrix<f64>>,
     splines: Vec<Option<SplineBlock>>,
-}
-
-/// The equations of one camera's spline.
-#[derive(Debug, Clone)]
-struct SplineBlock {
-    band: BandedMatrix,
-    gradient: DVector<f64>,
-    /// Knots (rows, row-major) by border columns.
-    border: Vec<f64>,
-    /// Where each border column stands among global parameters and poses.
-    columns: Vec<usize>,
 }
 
 impl NormalEquations {
@@ -199,21 +202,16 @@ impl NormalEquations {
             .enumerate()
             .map(|(camera_idx, camera)| {
                 let order = camera.knot_order()?;
-                let own: Vec<usize> = (0..observations.views.len())
+                // Views by the first knot that they touch: zeros above it cost nothing then.
+                let mut own: Vec<usize> = (0..observations.views.len())
                     .filter(|k| observations.views[*k].camera_idx == camera_idx)
                     .collect();
+                own.sort_by_key(|k| assembly::first_row(&order, &bases[*k]));
                 let views: Vec<_> = own.iter().map(|k| (&bases[*k], &sums[*k])).collect();
-                let poses: Vec<usize> = own
-                    .iter()
-                    .map(|k| observations.views[*k].pose_idx)
-                    .collect();
-                let sums = assembly::spline_sums(camera, &order, &views);
+                let poses = own.iter().map(|k| observations.views[*k].pose_idx);
                 Some(SplineBlock::new(
-                    &sums,
-                    layout,
-                    camera_idx,
-                    &poses,
-                    &to_columns[camera_idx],
+                    assembly::spline_sums(camera, &order, &views),
+                    border_columns(layout, camera_idx, poses, to_columns[camera_idx].clone()),
                 ))
             })
             .collect();
@@ -237,7 +235,8 @@ impl NormalEquations {
                 block += &sums.field;
             }
         }
-        let carried = to_columns.tr_mul(&(block * to_columns));
+        block.fill_upper_triangle_with_lower_triangle();
+        let carried = to_columns.transpose() * (block * to_columns);
         let start = layout.cameras[camera_idx].direction.start;
         self.global
             .view_mut((start, start), carried.shape())
@@ -252,7 +251,7 @@ impl NormalEquations {
         sums: &ViewSums,
         to_columns: &DMatrix<f64>,
     ) {
-        let carried = to_columns.tr_mul(&sums.field_small);
+        let carried = to_columns.transpose() * &sums.field_small;
         let start = layout.cameras[view.camera_idx].direction.start;
         let field = start..start + carried.nrows();
         let gradient = sums.small.ncols() - 1;
@@ -304,8 +303,7 @@ impl NormalEquations {
                 self.global_gradient[row] += weight * amount;
             }
             if let (Some(block), Some(energy)) = (spline, &priors.thin_plate) {
-                block.band.add_scaled(priors.spline, energy);
-                block.gradient += energy.times(&camera.spline_amounts()) * priors.spline;
+                block.add_prior(priors.spline, energy, &camera.spline_amounts());
             }
         }
         for (row, term) in layout.board.clone().zip(&model.board_shape.terms) {
@@ -340,23 +338,28 @@ impl NormalEquations {
 
     /// Without splines: the poses go first.
     fn reduce_poses(&self, mut global: DMatrix<f64>, poses: &[Matrix6<f64>]) -> Option<Reduced> {
+        let global_len = global.nrows();
         let mut right = -&self.global_gradient;
+        // With V = L L^T and Y = L^-1 W^T, the pose takes Y^T Y off the global block.
+        let mut y = DMatrix::zeros(global_len, 6 * poses.len());
         let mut factors = Vec::with_capacity(poses.len());
-        for ((block, gradient), coupling) in
-            poses.iter().zip(&self.pose_gradients).zip(&self.coupling)
-        {
+        for (idx, (block, gradient)) in poses.iter().zip(&self.pose_gradients).enumerate() {
+            let coupling = &self.coupling[idx];
             let factor = block.cholesky()?;
-            // With V = L L^T and Y = W L^-T, the pose takes Y Y^T off the global block.
-            let mut y = coupling.transpose();
-            factor.l_dirty().solve_lower_triangular_mut(&mut y);
-            global.gemm_tr(-1.0, &y, &y, 1.0);
+            let inverse = factor
+                .l_dirty()
+                .solve_lower_triangular(&Matrix6::identity())?;
+            y.columns_mut(6 * idx, 6)
+                .gemm(1.0, coupling, &inverse.transpose(), 0.0);
             right += coupling * factor.solve(gradient);
             factors.push(factor);
         }
+        // Column-major y is its transpose in row-major storage.
+        global -= gram(y.as_slice(), &vec![0; global_len]);
         Some(Reduced {
-            border: global.cholesky()?,
+            border: BandedCholesky::of_dense(&global)?,
             right,
-            global_len: self.global_gradient.len(),
+            global_len,
             eliminated: Eliminated::Poses(factors),
         })
     }
@@ -370,6 +373,7 @@ impl NormalEquations {
     ) -> Option<Reduced> {
         let global_len = global.nrows();
         let size = global_len + 6 * poses.len();
+        // The lower triangle.
         let mut border = DMatrix::zeros(size, size);
         let mut right = DVector::zeros(size);
         border
@@ -382,8 +386,8 @@ impl NormalEquations {
             let at = global_len + 6 * pose_idx;
             border.view_mut((at, at), (6, 6)).copy_from(block);
             border
-                .view_mut((0, at), (global_len, 6))
-                .copy_from(&self.coupling[pose_idx]);
+                .view_mut((at, 0), (6, global_len))
+                .copy_from(&self.coupling[pose_idx].transpose());
             right
                 .rows_mut(at, 6)
                 .copy_from(&-self.pose_gradients[pose_idx]);
@@ -396,39 +400,21 @@ impl NormalEquations {
                 Some(block) => block.eliminate(damping).map(Some),
             })
             .collect::<Option<_>>()?;
-        for (block, spline) in self.splines.iter().zip(&eliminated) {
-            if let (Some(block), Some(spline)) = (block, spline) {
-                // Y^T Y, the share of this spline in the border.
-                let share = &spline.y_transposed * spline.y_transposed.transpose();
-                let pulled = &spline.y_transposed * &spline.solved_gradient;
-                for (b, column) in block.columns.iter().enumerate() {
-                    right[*column] += pulled[b];
-                    for (a, row) in block.columns.iter().enumerate() {
-                        if row <= column {
-                            border[(*row, *column)] -= share[(a, b)];
-                        }
-                    }
-                }
-            }
+        for spline in eliminated.iter().flatten() {
+            spline.subtract_from(&mut border, &mut right);
         }
-        border.fill_lower_triangle_with_upper_triangle();
         Some(Reduced {
-            border: border.cholesky()?,
+            border: BandedCholesky::of_dense(&border)?,
             right,
             global_len,
-            eliminated: Eliminated::Splines(
-                self.splines
-                    .iter()
-                    .zip(eliminated)
-                    .map(|(block, spline)| Some((block.as_ref()?.columns.clone(), spline?)))
-                    .collect(),
-            ),
+            eliminated: Eliminated::Splines(eliminated),
         })
     }
 
     /// The step that the (damped) equations ask for.
     pub fn step(&self, reduced: &Reduced) -> Step {
-        let border = reduced.border.solve(&reduced.right);
+        let mut border = reduced.right.clone();
+        reduced.border.solve_vector(&mut border);
         match &reduced.eliminated {
             Eliminated::Poses(factors) => {
                 let poses = self
@@ -451,12 +437,9 @@ impl NormalEquations {
                 let splines = splines
                     .iter()
                     .map(|spline| {
-                        spline.as_ref().map_or_else(
-                            || DVector::zeros(0),
-                            |(columns, spline)| {
-                                spline.back_substitute(&-&spline.solved_gradient, columns, &border)
-                            },
-                        )
+                        spline
+                            .as_ref()
+                            .map_or_else(|| DVector::zeros(0), |spline| spline.step(&border))
                     })
                     .collect();
                 let global_len = reduced.global_len;
@@ -498,82 +481,11 @@ impl NormalEquations {
     }
 }
 
-impl SplineBlock {
-    fn new(
-        sums: &SplineSums,
-        layout: &Layout,
-        camera_idx: usize,
-        poses: &[usize],
-        to_columns: &DMatrix<f64>,
-    ) -> Self {
-        let (rows, field_len) = (sums.band.size(), to_columns.nrows());
-        // Border columns that exist as parameters: a camera without extrinsics has none of them.
-        let fixed: Vec<(usize, usize)> = fixed_columns(layout, camera_idx)
-            .enumerate()
-            .filter_map(|(k, global)| Some((field_len + k, global?)))
-            .collect();
-        let fixed_len = fixed_columns(layout, camera_idx).count();
-        let pose_columns = poses.iter().enumerate().flat_map(|(k, pose_idx)| {
-            (0..6).map(move |c| {
-                (
-                    field_len + fixed_len + 6 * k + c,
-                    layout.global_len + 6 * pose_idx + c,
-                )
-            })
-        });
-        let kept: Vec<(usize, usize)> = fixed.into_iter().chain(pose_columns).collect();
-        let start = layout.cameras[camera_idx].direction.start;
-        let parameters = to_columns.ncols();
-        let columns: Vec<usize> = (start..start + parameters)
-            .chain(kept.iter().map(|(_, global)| *global))
-            .collect();
-        let mut border = vec![0.0; rows * columns.len()];
-        let source = nalgebra::DMatrixView::from_slice_with_strides(
-            &sums.border,
-            field_len,
-            rows,
-            1,
-            sums.border_len,
-        );
-        let carried = to_columns.tr_mul(&source);
-        for row in 0..rows {
-            let target = &mut border[row * columns.len()..][..columns.len()];
-            target[..parameters].copy_from_slice(carried.column(row).as_slice());
-            let source = &sums.border[row * sums.border_len..][..sums.border_len];
-            for (entry, (from, _)) in target[parameters..].iter_mut().zip(&kept) {
-                *entry = source[*from];
-            }
-        }
-        Self {
-            band: sums.band.clone(),
-            gradient: DVector::from_fn(rows, |row, _| sums.border[(row + 1) * sums.border_len - 1]),
-            border,
-            columns,
-        }
-    }
-
-    fn eliminate(&self, damping: f64) -> Option<EliminatedSpline> {
-        let mut band = self.band.clone();
-        band.scale_diagonal(1.0 + damping);
-        let factor = band.cholesky()?;
-        let mut y = self.border.clone();
-        factor.solve_lower(&mut y, self.columns.len());
-        let mut solved_gradient = self.gradient.clone();
-        factor.solve_lower_vector(&mut solved_gradient);
-        Some(EliminatedSpline {
-            // Row-major y is its transpose in column-major storage.
-            y_transposed: DMatrix::from_vec(self.columns.len(), self.band.size(), y),
-            solved_gradient,
-            factor,
-        })
-    }
-}
-
 /// The factorized equations.
 #[derive(Debug, Clone)]
 pub struct Reduced {
     /// Of the global parameters, and of the poses behind them if splines were eliminated.
-    pub(super) border: Cholesky<f64, Dyn>,
+    pub(super) border: BandedCholesky,
     right: DVector<f64>,
     pub(super) global_len: usize,
     pub(super) eliminated: Eliminated,
@@ -582,49 +494,39 @@ pub struct Reduced {
 #[derive(Debug, Clone)]
 pub(super) enum Eliminated {
     Poses(Vec<Cholesky<f64, nalgebra::Const<6>>>),
-    /// Border columns and factor per camera with a spline.
-    Splines(Vec<Option<(Vec<usize>, EliminatedSpline)>>),
-}
-
-/// `F = L L^T`, `Y = L^-1 E`, `L^-1 gradient`.
-#[derive(Debug, Clone)]
-pub(super) struct EliminatedSpline {
-    pub(super) factor: BandedCholesky,
-    pub(super) y_transposed: DMatrix<f64>,
-    solved_gradient: DVector<f64>,
-}
-
-impl EliminatedSpline {
-    /// The knots' part of a solution: `L^-T (solved - Y border)`.
-    fn back_substitute(
-        &self,
-        solved: &DVector<f64>,
-        columns: &[usize],
-        border: &DVector<f64>,
-    ) -> DVector<f64> {
-        let own = DVector::from_iterator(columns.len(), columns.iter().map(|c| border[*c]));
-        let mut knots = solved - self.y_transposed.tr_mul(&own);
-        self.factor.solve_upper_vector(&mut knots);
-        knots
-    }
+    /// Per camera.
+    Splines(Vec<Option<EliminatedSpline>>),
 }
 
 impl Reduced {
-    /// Covariance of the global parameters (everything else marginalized), if the weights are
+    /// Number of equations of poses behind those of the global parameters.
+    pub(super) fn pose_columns(&self) -> usize {
+        self.right.len() - self.global_len
+    }
+
+    /// Variances of the global parameters (everything else marginalized), if the weights are
     /// inverse variances and the damping was 0.
-    pub fn global_covariance(&self) -> DMatrix<f64> {
-        let n = self.global_len;
-        let size = self.border.l_dirty().nrows();
-        let mut units = DMatrix::zeros(size, n);
-        units.fill_with_identity();
-        self.border.solve_mut(&mut units);
-        units.rows(0, n).into_owned()
+    pub fn global_variances(&self) -> DVector<f64> {
+        // Of the inverse of L L^T: the squared lengths of the columns of L^-1.
+        let (n, size) = (self.global_len, self.right.len());
+        let mut units = vec![0.0; size * n];
+        for k in 0..n {
+            units[k * n + k] = 1.0;
+        }
+        self.border
+            .solve_lower(&mut units, &(0..n).collect::<Vec<_>>());
+        let mut variances = DVector::zeros(n);
+        for row in units.chunks_exact(n.max(1)) {
+            for (sum, x) in variances.iter_mut().zip(row) {
+                *sum += x * x;
+            }
+        }
+        variances
     }
 
     /// Natural logarithm of the determinant of the whole Hessian.
     pub fn ln_determinant(&self) -> f64 {
-        let l = self.border.l_dirty();
-        let border = 2.0 * (0..l.nrows()).map(|k| l[(k, k)].ln()).sum::<f64>();
+        let border = self.border.ln_determinant();
         let eliminated: f64 = match &self.eliminated {
             Eliminated::Poses(factors) => factors
                 .iter()
@@ -633,7 +535,7 @@ impl Reduced {
             Eliminated::Splines(splines) => splines
                 .iter()
                 .flatten()
-                .map(|(_, spline)| spline.factor.ln_determinant())
+                .map(EliminatedSpline::ln_determinant)
                 .sum(),
         };
         border + eliminated
@@ -650,27 +552,47 @@ impl Reduced {
         let Eliminated::Splines(splines) = &self.eliminated else {
             return 0.0;
         };
-        let Some(Some((columns, spline))) = splines.get(camera_idx) else {
+        let Some(Some(spline)) = splines.get(camera_idx) else {
             return 0.0;
         };
+        let count = probes.len();
+        let mut columns = vec![0.0; matrix.size() * count];
+        for (k, probe) in probes.iter().enumerate() {
+            for (row, value) in probe.iter().enumerate() {
+                columns[row * count + k] = *value;
+            }
+        }
+        let solved = spline.covariance_times(&columns, count, &self.border, self.right.len());
         let sum: f64 = probes
-            .par_iter()
-            .map(|probe| {
-                let mut solved = probe.clone();
-                spline.factor.solve_lower_vector(&mut solved);
-                let pulled = &spline.y_transposed * &solved;
-                let mut border = DVector::zeros(self.right.len());
-                for (column, value) in columns.iter().zip(pulled.iter()) {
-                    border[*column] = -value;
-                }
-                self.border.solve_mut(&mut border);
-                let knots = spline.back_substitute(&solved, columns, &border);
-                matrix.times(probe).dot(&knots)
-            })
-            .collect::<Vec<f64>>()
             .iter()
+            .enumerate()
+            .map(|(k, probe)| {
+                let weighted = matrix.times(probe);
+                let solved = solved.iter().skip(k).step_by(count);
+                weighted.iter().zip(solved).map(|(a, b)| a * b).sum::<f64>()
+            })
             .sum();
-        sum / probes.len() as f64
+        sum / count as f64
+    }
+}
+
+/// What the border columns of a camera's spline stand for, see [`assembly::SplineSums::border`].
+fn border_columns(
+    layout: &Layout,
+    camera_idx: usize,
+    poses: impl Iterator<Item = usize>,
+    field: DMatrix<f64>,
+) -> BorderColumns {
+    let mut others: Vec<Option<usize>> = fixed_columns(layout, camera_idx).collect();
+    let gradient = others.len();
+    others.push(None);
+    others
+        .extend(poses.flat_map(|pose| (0..6).map(move |k| Some(layout.global_len + 6 * pose + k))));
+    BorderColumns {
+        field,
+        field_start: layout.cameras[camera_idx].direction.start,
+        others,
+        gradient,
     }
 }
 

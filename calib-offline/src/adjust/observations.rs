@@ -5,9 +5,10 @@ use crate::board::BoardSpec;
 use crate::dataset::View;
 use crate::field::polynomial::{self, Polynomial};
 use crate::field::spline::AxisWeights;
-use crate::field::{FieldSample, RayField};
+use crate::field::{BaseLens, FieldSample, RayField};
 use crate::geometry::{PixelPoint, SensorSize};
-use nalgebra::{DMatrix, Matrix2, RowVector2, Vector2, Vector3};
+use nalgebra::{DMatrix, Matrix2, Vector2, Vector3};
+use std::sync::Arc;
 
 /// All views offered to an adjustment.
 #[derive(Debug, Clone)]
@@ -152,50 +153,85 @@ fn median_sigma_px(views: &[View]) -> f64 {
 /// the weights of the spline's knots.
 #[derive(Debug, Clone)]
 pub struct ViewBasis {
-    /// Base lens at each corner: half-angle vector and derivative per px.
-    pub base: Vec<(Vector2<f64>, Matrix2<f64>)>,
-    /// Products of the highest degree in use, one row per corner; those of lower degree come
-    /// first.
-    pub products: DMatrix<f64>,
-    /// Their derivatives by u, 1/px.
-    pub products_du: DMatrix<f64>,
-    /// Their derivatives by v, 1/px.
-    pub products_dv: DMatrix<f64>,
+    /// Base lens and products; shared by all models that differ in knots only.
+    polynomial: Arc<PolynomialBasis>,
     /// Weights along u and v at each corner; empty without a spline.
     pub knots: Vec<(AxisWeights, AxisWeights)>,
+}
+
+#[derive(Debug)]
+struct PolynomialBasis {
+    lens: BaseLens,
+    degree: usize,
+    /// Base lens at each corner: half-angle vector and derivative per px.
+    base: Vec<(Vector2<f64>, Matrix2<f64>)>,
+    /// Products of the highest degree in use, one column per corner; those of lower degree come
+    /// first.
+    products: DMatrix<f64>,
+    /// Their derivatives by u, 1/px.
+    products_du: DMatrix<f64>,
+    /// Their derivatives by v, 1/px.
+    products_dv: DMatrix<f64>,
 }
 
 impl ViewBasis {
     /// Evaluates the fixed functions of a field at the corners of a view.
     pub fn new(view: &ViewBlock, field: &RayField) -> Self {
-        let degree = field
+        Self {
+            polynomial: Arc::new(PolynomialBasis::new(view, field)),
+            knots: knots(view, field),
+        }
+    }
+
+    /// The same for a changed field; what did not change is taken over.
+    pub fn of_changed(&self, view: &ViewBlock, field: &RayField) -> Self {
+        let known = &self.polynomial;
+        if known.lens == field.base && known.degree == highest_degree(field) {
+            Self {
+                polynomial: Arc::clone(known),
+                knots: knots(view, field),
+            }
+        } else {
+            Self::new(view, field)
+        }
+    }
+
+    /// Legendre products, one column per corner; those of lower degree come first.
+    pub fn products(&self) -> &DMatrix<f64> {
+        &self.polynomial.products
+    }
+
+    /// The field's numbers at a corner.
+    pub fn sample(&self, field: &RayField, corner_idx: usize) -> FieldSample {
+        let fixed = &*self.polynomial;
+        let (mut s, mut ds) = fixed.base[corner_idx];
+        let (value, derivative) = fixed.sum(&field.direction.polynomial, corner_idx);
+        s += value;
+        ds += derivative;
+        if let (Some(spline), Some((u, v))) = (&field.direction.spline, self.knots.get(corner_idx))
+        {
+            let (value, derivative) = spline.weighted(u, v);
+            s += value;
+            ds += derivative;
+        }
+        let (m_mm, dm) = field
             .offset
             .as_ref()
-            .map_or(0, |offset| offset.polynomial.degree)
-            .max(field.direction.polynomial.degree);
-        let (n, k) = (view.corners.len(), polynomial::term_count(degree));
-        let mut basis = Self {
-            base: Vec::with_capacity(n),
-            products: DMatrix::zeros(n, k),
-            products_du: DMatrix::zeros(n, k),
-            products_dv: DMatrix::zeros(n, k),
-            knots: Vec::new(),
-        };
-        let center = field.sensor.center();
-        let mut row = Vec::with_capacity(k);
-        for (r, corner) in view.corners.iter().enumerate() {
-            let offset = Vector2::new(corner.pixel.u - center.u, corner.pixel.v - center.v);
-            basis.base.push(field.base.evaluate(&offset));
-            polynomial::basis(field.sensor, degree, corner.pixel, &mut row);
-            for (c, [value, du, dv]) in row.iter().enumerate() {
-                basis.products[(r, c)] = *value;
-                basis.products_du[(r, c)] = *du;
-                basis.products_dv[(r, c)] = *dv;
-            }
-        }
-        if let Some(spline) = &field.direction.spline {
-            basis.knots = view
-                .corners
+            .map_or((Vector2::zeros(), Matrix2::zeros()), |offset| {
+                fixed.sum(&offset.polynomial, corner_idx)
+            });
+        FieldSample { s, ds, m_mm, dm }
+    }
+}
+
+/// Weights of the spline's knots along u and v at each corner of a view.
+fn knots(view: &ViewBlock, field: &RayField) -> Vec<(AxisWeights, AxisWeights)> {
+    field
+        .direction
+        .spline
+        .as_ref()
+        .map_or_else(Vec::new, |spline| {
+            view.corners
                 .iter()
                 .map(|corner| {
                     (
@@ -203,41 +239,57 @@ impl ViewBasis {
                         spline.grid.weights_v(corner.pixel.v),
                     )
                 })
-                .collect();
+                .collect()
+        })
+}
+
+fn highest_degree(field: &RayField) -> usize {
+    field
+        .offset
+        .as_ref()
+        .map_or(0, |offset| offset.polynomial.degree)
+        .max(field.direction.polynomial.degree)
+}
+
+impl PolynomialBasis {
+    fn new(view: &ViewBlock, field: &RayField) -> Self {
+        let degree = highest_degree(field);
+        let (n, k) = (view.corners.len(), polynomial::term_count(degree));
+        let mut basis = Self {
+            lens: field.base,
+            degree,
+            base: Vec::with_capacity(n),
+            products: DMatrix::zeros(k, n),
+            products_du: DMatrix::zeros(k, n),
+            products_dv: DMatrix::zeros(k, n),
+        };
+        let center = field.sensor.center();
+        let mut values = Vec::with_capacity(k);
+        for (c, corner) in view.corners.iter().enumerate() {
+            let offset = Vector2::new(corner.pixel.u - center.u, corner.pixel.v - center.v);
+            basis.base.push(field.base.evaluate(&offset));
+            polynomial::basis(field.sensor, degree, corner.pixel, &mut values);
+            for (r, [value, du, dv]) in values.iter().enumerate() {
+                basis.products[(r, c)] = *value;
+                basis.products_du[(r, c)] = *du;
+                basis.products_dv[(r, c)] = *dv;
+            }
         }
         basis
     }
 
-    /// The field's numbers at a corner.
-    pub fn sample(&self, field: &RayField, corner_idx: usize) -> FieldSample {
-        let (mut s, mut ds) = self.base[corner_idx];
-        self.add_polynomial(&field.direction.polynomial, corner_idx, &mut s, &mut ds);
-        if let (Some(spline), Some((u, v))) = (&field.direction.spline, self.knots.get(corner_idx))
-        {
-            let (value, derivative) = spline.weighted(u, v);
-            s += value;
-            ds += derivative;
+    /// A polynomial and its derivative by (u, v) at a corner.
+    fn sum(&self, polynomial: &Polynomial, corner_idx: usize) -> (Vector2<f64>, Matrix2<f64>) {
+        let columns = [&self.products, &self.products_du, &self.products_dv];
+        let [p, du, dv] = columns.map(|m| &m.as_slice()[corner_idx * m.nrows()..][..m.nrows()]);
+        let mut sums = [[0.0; 2]; 3];
+        for (((c, p), du), dv) in polynomial.coefficients.iter().zip(p).zip(du).zip(dv) {
+            for (sum, factor) in sums.iter_mut().zip([p, du, dv]) {
+                sum[0] += c.x * factor;
+                sum[1] += c.y * factor;
+            }
         }
-        let (mut m_mm, mut dm) = (Vector2::zeros(), Matrix2::zeros());
-        if let Some(offset) = &field.offset {
-            self.add_polynomial(&offset.polynomial, corner_idx, &mut m_mm, &mut dm);
-        }
-        FieldSample { s, ds, m_mm, dm }
-    }
-
-    fn add_polynomial(
-        &self,
-        polynomial: &Polynomial,
-        corner_idx: usize,
-        value: &mut Vector2<f64>,
-        derivative: &mut Matrix2<f64>,
-    ) {
-        for (k, c) in polynomial.coefficients.iter().enumerate() {
-            *value += c * self.products[(corner_idx, k)];
-            *derivative += c * RowVector2::new(
-                self.products_du[(corner_idx, k)],
-                self.products_dv[(corner_idx, k)],
-            );
-        }
+        let [value, du, dv] = sums.map(Vector2::from);
+        (value, Matrix2::from_columns(&[du, dv]))
     }
 }

@@ -17,6 +17,10 @@ const OFFSET_DEGREE: usize = 7;
 const ROUNDS: usize = 8;
 /// A round that changes twice the log evidence by less settles the fit.
 const SETTLED: f64 = 0.5;
+/// A model is given up when it is behind its rival by more than this and so many times the change
+/// of its last round: weights that are still on their way gain tens, not more.
+const HOPELESS_GAP: f64 = 100.0;
+const HOPELESS_CHANGES: f64 = 10.0;
 /// Twice the log evidence that a more flexible model must gain: "positive" on the scale of Kass
 /// and Raftery (1995). Ties go to the simpler model.
 const NEEDED_GAIN: f64 = 4.0;
@@ -27,7 +31,7 @@ pub struct Choice {
     /// In words.
     pub what: String,
     /// Twice its log evidence minus that of the model that was best until then; minus infinity if
-    /// the data leave a parameter of it open.
+    /// the data leave a parameter of it open, and only roughly so if it is far behind.
     pub gain: f64,
     /// Whether it was taken.
     pub taken: bool,
@@ -42,17 +46,22 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// Takes a fit through rounds until its evidence settles.
+    /// Takes a fit through rounds until its evidence settles, or until it is clear that it cannot
+    /// reach `rival`, the evidence of another model (minus infinity: there is none).
     ///
     /// # Errors
     /// [`EstimateError::Singular`].
-    pub fn settle(mut fit: Fit, observations: &Observations) -> Result<Self, EstimateError> {
+    pub fn settle(
+        mut fit: Fit,
+        rival: f64,
+        observations: &Observations,
+    ) -> Result<Self, EstimateError> {
         let mut evidence = f64::NEG_INFINITY;
         for _ in 0..ROUNDS {
             let now = fit.round(observations)?;
-            let settled = (now - evidence).abs() < SETTLED;
+            let change = (now - evidence).abs();
             evidence = now;
-            if settled {
+            if change < SETTLED || rival - now > HOPELESS_GAP + HOPELESS_CHANGES * change {
                 break;
             }
         }
@@ -134,8 +143,8 @@ fn take_if_better(
     change: impl FnOnce(&mut Model),
 ) -> bool {
     // A model that the data leave open has no evidence for it; the one so far stands.
-    let Ok(candidate) = Candidate::settle(best.fit.changed(observations, change), observations)
-    else {
+    let changed = best.fit.changed(observations, change);
+    let Ok(candidate) = Candidate::settle(changed, best.evidence, observations) else {
         tried.push(Choice {
             what,
             gain: f64::NEG_INFINITY,

@@ -81,11 +81,11 @@ pub fn estimate(observations: &Observations, start: &RigStart) -> Result<Estimat
 
     // What the evidence asks for beyond, first as if corners were independent: only a field that
     // fits shows how much they are not.
-    let settled = Candidate::settle(fit, &observations)?;
+    let settled = Candidate::settle(fit, f64::NEG_INFINITY, &observations)?;
     let (mut best, mut choices) = choice::choose(settled, &observations);
     let correlation = best.fit.measure_correlation(&observations);
     if best.fit.share < 1.0 {
-        best = Candidate::settle(best.fit, &observations)?;
+        best = Candidate::settle(best.fit, f64::NEG_INFINITY, &observations)?;
         choice::simplify(&mut best, &mut choices, &observations);
     }
     let mut fit = best.fit;

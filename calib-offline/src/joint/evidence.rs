@@ -4,7 +4,7 @@ use super::fit::Fit;
 use crate::adjust::model::Layout;
 use crate::adjust::normal_equations::{CameraPriors, Priors, Reduced};
 use crate::adjust::{CameraModel, Model};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -48,6 +48,8 @@ struct Group {
     /// Which of the camera's amounts belong; empty for a spline (all do).
     members: Vec<usize>,
     precision: f64,
+    /// Of a spline, of the energy behind it; else 0.
+    energy_ln_determinant: f64,
     last_log_step: f64,
     growth: f64,
     effective: f64,
@@ -106,7 +108,12 @@ impl Smoothness {
                     Family::Spline => START_SPLINE,
                     Family::Offset(_) => START_OFFSET,
                 };
+                let energy_ln_determinant = match (family, camera.knot_order()) {
+                    (Family::Spline, Some(order)) => order.thin_plate_ln_determinant(),
+                    _ => 0.0,
+                };
                 self.groups.push(Group {
+                    energy_ln_determinant,
                     camera_idx,
                     family,
                     members,
@@ -143,7 +150,7 @@ impl Smoothness {
     /// `gamma = dim - lambda tr(S covariance)`, the number of parameters that the data determine,
     /// and `energy = a^T S a`.
     pub fn update(&mut self, model: &Model, layout: &Layout, priors: &Priors, reduced: &Reduced) {
-        let covariance = reduced.global_covariance();
+        let variances = reduced.global_variances();
         for group in &mut self.groups {
             let camera = &model.cameras[group.camera_idx];
             let (dimension, trace, energy) = match group.family {
@@ -162,12 +169,12 @@ impl Smoothness {
                 Family::Direction(_) => {
                     let amounts = camera.basis.amounts(&camera.field.direction.polynomial);
                     let start = layout.cameras[group.camera_idx].direction.start;
-                    member_sums(&group.members, &amounts, start, &covariance)
+                    member_sums(&group.members, &amounts, start, &variances)
                 }
                 Family::Offset(_) => {
                     let amounts = camera.offset_amounts();
                     let start = layout.cameras[group.camera_idx].offset.start;
-                    member_sums(&group.members, &amounts, start, &covariance)
+                    member_sums(&group.members, &amounts, start, &variances)
                 }
             };
             group.step(dimension, trace, energy);
@@ -186,20 +193,12 @@ impl Smoothness {
     }
 
     /// `sum dim ln lambda + ln det S`: the priors' share of twice the log evidence.
-    pub fn ln_prior_determinant(&self, model: &Model, priors: &Priors) -> f64 {
+    pub fn ln_prior_determinant(&self, model: &Model) -> f64 {
         self.groups
             .iter()
             .map(|group| {
                 let count = parameter_count(group, &model.cameras[group.camera_idx]) as f64;
-                let energy = match group.family {
-                    Family::Spline => priors.cameras[group.camera_idx]
-                        .thin_plate
-                        .clone()
-                        .and_then(crate::adjust::banded::BandedMatrix::cholesky)
-                        .map_or(0.0, |factor| factor.ln_determinant()),
-                    _ => 0.0,
-                };
-                count * group.precision.ln() + energy
+                count * group.precision.ln() + group.energy_ln_determinant
             })
             .sum()
     }
@@ -240,12 +239,9 @@ fn member_sums(
     members: &[usize],
     amounts: &DVector<f64>,
     start: usize,
-    covariance: &DMatrix<f64>,
+    variances: &DVector<f64>,
 ) -> (f64, f64, f64) {
-    let trace = members
-        .iter()
-        .map(|k| covariance[(start + k, start + k)])
-        .sum();
+    let trace = members.iter().map(|k| variances[start + k]).sum();
     let energy = members.iter().map(|k| amounts[*k].powi(2)).sum();
     (members.len() as f64, trace, energy)
 }
@@ -312,7 +308,7 @@ impl Fit {
     /// effective number of corners, plus priors, minus what the parameters could have been.
     pub fn ln_evidence_twice(&self, reduced: &Reduced, priors: &Priors) -> f64 {
         self.share * 2.0 * self.log_likelihood() - priors.cost(&self.model)
-            + self.smoothness.ln_prior_determinant(&self.model, priors)
+            + self.smoothness.ln_prior_determinant(&self.model)
             - reduced.ln_determinant()
     }
 }

@@ -61,7 +61,7 @@ impl Fit {
         let mut next = self.clone();
         change(&mut next.model);
         next.smoothness.cover(&next.model);
-        next.bases = next.model.view_bases(observations);
+        next.bases = next.model.changed_view_bases(observations, &self.bases);
         next.residuals = normal_equations::residuals(&next.model, observations, &next.bases);
         next
     }
@@ -133,12 +133,13 @@ impl Fit {
         })?;
         let evidence = self.ln_evidence_twice(&reduced, &priors);
         let stepped = self.model.stepped(&layout, &equations.step(&reduced));
-        let cost = |model: &Model| {
-            normal_equations::cost(model, observations, &self.bases, &weights, &priors)
+        let cost = |model: &Model, residuals: &[Vec<Option<Vector2<f64>>>]| {
+            normal_equations::cost_of_residuals(residuals, model, observations, &weights, &priors)
         };
-        if cost(&stepped) < cost(&self.model) {
+        let residuals = normal_equations::residuals(&stepped, observations, &self.bases);
+        if cost(&stepped, &residuals) < cost(&self.model, &self.residuals) {
             self.model = stepped;
-            self.residuals = normal_equations::residuals(&self.model, observations, &self.bases);
+            self.residuals = residuals;
         } else {
             self.adjust(observations, 2);
         }
