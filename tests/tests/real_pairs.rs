@@ -19,9 +19,19 @@ fn held_out_pairs_are_measured_within_seven_tenths_of_a_percent() {
     assert_eq!((measured.folds, measured.square_mm), (5, 25.0));
     // Published tools reach 0.68 % on corners found by OpenCV.
     assert!(measured.neighbor_rms_percent <= 0.70, "{measured:?}");
-    // 13 pairs of 54 corners; those at the rim are outside what the other poses cover.
-    assert_eq!(measured.points + measured.outside + measured.unmet, 13 * 54);
-    assert!(measured.points > 630, "{measured:?}");
+    // Of the 13 pairs of 54 corners, those that are named as not exposed together are not scored;
+    // corners at the rim are outside what the other poses cover.
+    let poses = &checked.calibration.poses;
+    let pairs = poses
+        .iter()
+        .filter(|p| p.rms_px.iter().all(Option::is_some))
+        .count();
+    assert!(pairs >= 12, "{:?}", checked.calibration.left_out);
+    assert_eq!(
+        measured.points + measured.outside + measured.unmet,
+        pairs * 54
+    );
+    assert!(measured.points > pairs * 54 * 9 / 10, "{measured:?}");
 
     // The f64 rig says the same but for single precision and 0.001 px of the blob, which is 0.4 %
     // of the corners' own error.
