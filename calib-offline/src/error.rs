@@ -273,15 +273,15 @@ impl Error {
             Self::Calibration(error) => error.remedy(),
             Self::Blob(error) => error.remedy(),
             Self::Matches(error) => error.remedy(),
-            Self::Pack(error) => pack_remedy(error),
+            Self::Pack(error) => Some(pack_remedy(error)),
             Self::Write(error) => error.remedy(),
             Self::Usage(error) => error.remedy(),
         }
     }
 }
 
-fn pack_remedy(error: &PackError) -> Option<String> {
-    Some(match error {
+fn pack_remedy(error: &PackError) -> String {
+    match error {
         PackError::BadSetting { .. } => "give a bound in pixels such as 0.001".to_owned(),
         PackError::BoundNotReached { best_px, .. } => {
             format!(
@@ -297,5 +297,5 @@ fn pack_remedy(error: &PackError) -> Option<String> {
               a kilometer and needs names that differ"
                 .to_owned()
         }
-    })
+    }
 }

@@ -434,7 +434,12 @@ fn labels_that_do_not_belong_together() {
     let inspected = run(folder.path(), &["inspect", "set"]);
     let words = "6 of 12 views number the board as a mirror would";
     assert!(inspected.stdout.contains(words), "{}", inspected.stdout);
+}
 
+/// A camera whose board is numbered from the other end is not refused: the turn is undone, and
+/// the result says so.
+#[test]
+fn labels_turned_in_one_camera_lower_the_verdict() {
     let turned = changed_corners(|(camera, pose, row, col, u, v)| {
         let (row, col) = if camera == "right" {
             (5 - row, 4 - col)
@@ -444,9 +449,15 @@ fn labels_that_do_not_belong_together() {
         Some((camera, pose, row, col, u, v))
     });
     let folder = dataset(MANIFEST, turned.as_bytes());
-    run(folder.path(), &["calibrate", "set", "-o", "out"])
-        .assert_code(3)
-        .assert_says(&["turned by 180 degrees", "\"right\"", "try: turn the labels"]);
+    let object = run(folder.path(), &["calibrate", "set", "-o", "out", "--json"])
+        .assert_code(0)
+        .json();
+    assert_eq!(object["verdict"], "doubtful");
+    let reasons = object["reasons"].to_string();
+    assert!(
+        reasons.contains("6 of 12 views could not be used as recorded"),
+        "{reasons}"
+    );
 }
 
 #[test]
@@ -489,7 +500,7 @@ mod images {
         let square_px = 50 - 4 * pose;
         let (u, v) = (u.wrapping_sub(60), v.wrapping_sub(60));
         let on_board = u < 6 * square_px && v < 7 * square_px;
-        let dark = (u / square_px + v / square_px) % 2 == 0;
+        let dark = (u / square_px + v / square_px).is_multiple_of(2);
         if on_board && dark { 30 } else { 220 }
     }
 

@@ -14,9 +14,10 @@ fn checksums(folder: &Path, prefix: &str, found: &mut BTreeMap<String, String>) 
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_str().unwrap().to_owned();
         let place = format!("{prefix}{name}");
+        let describes = name == "SHA256SUMS" || path.extension().is_some_and(|e| e == "md");
         if path.is_dir() {
             checksums(&path, &format!("{place}/"), found);
-        } else if name != "SHA256SUMS" && !name.ends_with(".md") && !name.starts_with('.') {
+        } else if !describes && !name.starts_with('.') {
             let digest = Sha256::digest(fs::read(&path).unwrap());
             let hex = digest.iter().fold(String::new(), |mut hex, byte| {
                 // Writing to a String cannot fail.

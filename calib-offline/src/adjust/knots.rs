@@ -127,6 +127,7 @@ mod tests {
         };
         let order = KnotOrder::new(grid);
         let energy = order.thin_plate();
+        // Of the second differences alone: the ridge is taken off.
         let with = |f: fn(f64, f64) -> f64| {
             let mut x = DVector::zeros(2 * order.knot_count());
             for j in 0..grid.knots_v() {

@@ -129,7 +129,7 @@ pub enum DetectError {
         /// Other images that cannot be used.
         more: usize,
         /// What is wrong with the first.
-        source: ImageError,
+        source: Box<ImageError>,
     },
     /// The images cannot be numbered alike.
     #[error(transparent)]
@@ -264,7 +264,7 @@ fn all_loaded<T>(
                 camera: dataset.cameras[job.camera_idx].name.clone(),
                 pose: job.pose,
                 more: broken - 1,
-                source,
+                source: Box::new(source),
             })
         })
         .collect()

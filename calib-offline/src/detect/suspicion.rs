@@ -204,3 +204,106 @@ fn distance_px(views: &[View], camera_idx: usize, steps: i64) -> Option<f64> {
     let matches: Vec<Match> = pairs.into_iter().flatten().collect();
     FundamentalMatrix::from_matches(&matches)?.median_distance_px(&matches)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::board::BoardSpec;
+    use crate::dataset::CameraSpec;
+    use crate::geometry::{PixelPoint, SensorSize, so3};
+    use nalgebra::Vector3;
+
+    const BOARD: BoardSpec = BoardSpec {
+        rows: 6,
+        cols: 9,
+        square_mm: 25.0,
+    };
+
+    fn dataset() -> Dataset {
+        let camera = |name: &str| CameraSpec {
+            name: name.to_owned(),
+            sensor: SensorSize::new(640, 480),
+            images: Vec::new(),
+        };
+        Dataset {
+            folder: ".".into(),
+            board: BOARD,
+            cameras: vec![camera("left"), camera("right")],
+            stage: None,
+            excluded_poses: [].into(),
+        }
+    }
+
+    /// Six tilted boards some 30 cm away from two cameras 83 mm apart.
+    fn views() -> Vec<View> {
+        let corner = |camera_idx: usize, pose: usize, row: usize, col: usize| {
+            let tilt = 0.25 * pose as f64 - 0.6;
+            let rotation = so3::exp(&Vector3::new(tilt, 0.6 * tilt * tilt, 0.1));
+            let on_board = BOARD.corner_in_board(row, col) - BOARD.center_in_board();
+            let away = Vector3::new(
+                60.0 * tilt - 83.0 * camera_idx as f64,
+                0.0,
+                300.0 + 80.0 * tilt,
+            );
+            let p = rotation * on_board + away;
+            Corner {
+                row,
+                col,
+                pixel: PixelPoint::new(320.0 + 530.0 * p.x / p.z, 240.0 + 530.0 * p.y / p.z),
+                sigma_px: None,
+            }
+        };
+        let view = |k: usize| View {
+            camera_idx: k % 2,
+            pose: k / 2,
+            corners: (0..54)
+                .map(|n| corner(k % 2, k / 2, n / 9, n % 9))
+                .collect(),
+        };
+        (0..12).map(view).collect()
+    }
+
+    fn of_right(views: &mut [View]) -> impl Iterator<Item = &mut View> {
+        views.iter_mut().filter(|view| view.camera_idx == 1)
+    }
+
+    #[test]
+    fn labels_that_belong_together_are_not_suspected() {
+        assert_eq!(suspicious_labels(&dataset(), &views()), None);
+    }
+
+    #[test]
+    fn one_mirrored_view_is_named() {
+        let mut views = views();
+        for corner in &mut views[7].corners {
+            corner.pixel.u = 639.0 - corner.pixel.u;
+        }
+        let suspicion = suspicious_labels(&dataset(), &views).unwrap();
+        let words = "camera \"right\" sees the board mirrored in pose 3";
+        assert!(suspicion.to_string().contains(words), "{suspicion}");
+    }
+
+    #[test]
+    fn a_camera_numbered_from_the_other_end_is_named() {
+        let mut views = views();
+        for corner in of_right(&mut views).flat_map(|view| &mut view.corners) {
+            (corner.row, corner.col) = BOARD.half_turned(corner.row, corner.col);
+        }
+        let suspicion = suspicious_labels(&dataset(), &views).unwrap();
+        assert!(
+            matches!(&suspicion, LabelSuspicion::TurnedCamera { camera, .. } if camera == "right"),
+            "{suspicion}"
+        );
+    }
+
+    #[test]
+    fn cameras_out_of_step_are_named() {
+        let mut views = views();
+        of_right(&mut views).for_each(|view| view.pose += 2);
+        let suspicion = suspicious_labels(&dataset(), &views).unwrap();
+        assert!(
+            matches!(suspicion, LabelSuspicion::OutOfStep { steps: -2, .. }),
+            "{suspicion}"
+        );
+    }
+}

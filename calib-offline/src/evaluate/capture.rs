@@ -236,24 +236,25 @@ mod tests {
         }
     }
 
-    /// Full boards that fill a rectangle of the sensor.
+    /// Full boards that fill a rectangle of the sensor, each a little less than the one before.
     fn views(count: usize, [u0, v0, u1, v1]: [f64; 4]) -> Vec<View> {
+        let corner = |pose: usize, row: usize, col: usize| {
+            let margin = 2.0 * pose as f64;
+            Corner {
+                row,
+                col,
+                pixel: PixelPoint::new(
+                    u0 + margin + (u1 - u0 - margin) * col as f64 / 4.0,
+                    v0 + margin + (v1 - v0 - margin) * row as f64 / 3.0,
+                ),
+                sigma_px: None,
+            }
+        };
         (0..count)
             .map(|pose| View {
                 camera_idx: 0,
                 pose,
-                corners: (0..4)
-                    .flat_map(|row| (0..5).map(move |col| (row, col)))
-                    .map(|(row, col)| Corner {
-                        row,
-                        col,
-                        pixel: PixelPoint::new(
-                            u0 + (u1 - u0) * col as f64 / 4.0,
-                            v0 + (v1 - v0) * row as f64 / 3.0,
-                        ),
-                        sigma_px: None,
-                    })
-                    .collect(),
+                corners: (0..20).map(|k| corner(pose, k / 5, k % 5)).collect(),
             })
             .collect()
     }
@@ -302,6 +303,21 @@ mod tests {
             warnings(&views)
                 .iter()
                 .any(|w| w.contains("3 rows and 4 cols"))
+        );
+    }
+
+    #[test]
+    fn labels_as_in_a_mirror_show() {
+        let mut views = views(12, [5.0, 5.0, 890.0, 590.0]);
+        for corner in views.iter_mut().flat_map(|view| &mut view.corners) {
+            corner.pixel.u = 899.0 - corner.pixel.u;
+        }
+        let all = warnings(&views);
+        assert_eq!(all.len(), 1);
+        assert!(
+            all[0].contains("12 of 12 views number the board"),
+            "{}",
+            all[0]
         );
     }
 

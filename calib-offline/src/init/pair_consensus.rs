@@ -23,6 +23,9 @@ pub const FINE_LIMIT_SIGMA: f64 = 8.0;
 /// boards at the image's edge), and reaches 7 times the middle pair where there are few pairs. Only
 /// pairs that would pull the estimate away must be found by then.
 pub const COARSE_LIMIT_SIGMA: f64 = 20.0;
+/// A misfit per corner below the corner noise itself (2 variances per axis: the length of a residual
+/// vector) is none either: a bent board or uneven light does as much, and it harms no estimate.
+const HARMLESS_VARIANCES: f64 = 2.0;
 /// Pairs that propose a relative pose, and pairs that are asked about it, at most.
 const MOST_PROPOSALS: usize = 40;
 const MOST_ASKED: usize = 120;
@@ -166,7 +169,9 @@ impl Pair<'_> {
         second_from_first: &RigidTransform,
         turn: &RigidTransform,
         limit_px2: f64,
+        harmless_px2: f64,
     ) -> Reading {
+        let limit_px2 = limit_px2.max(harmless_px2 * self.corner_count() as f64);
         let plain = self.misfit_px2(second_from_first, None);
         let turned = self.misfit_px2(second_from_first, Some(turn));
         // As numbered if that fits at all; turned only if that fits.
@@ -179,9 +184,12 @@ impl Pair<'_> {
         }
     }
 
+    fn corner_count(&self) -> usize {
+        self.first.corner_count + self.second.corner_count
+    }
+
     fn per_corner_px(&self, misfit_px2: f64) -> f64 {
-        let corners = self.first.corner_count + self.second.corner_count;
-        (misfit_px2 / corners.max(1) as f64).sqrt()
+        (misfit_px2 / self.corner_count().max(1) as f64).sqrt()
     }
 
     fn corner_variance_px2(&self) -> f64 {
@@ -256,7 +264,7 @@ fn refine(
     let limit_px2 = limit_sigma * limit_sigma * variance_px2;
     let readings: Vec<Reading> = pairs
         .iter()
-        .map(|pair| pair.read(&transform, turn, limit_px2))
+        .map(|pair| pair.read(&transform, turn, limit_px2, HARMLESS_VARIANCES * floor_px2))
         .collect();
     Consensus {
         second_from_first: transform,

@@ -96,7 +96,16 @@ pub(super) fn write<S: PointSource>(
                 out.push(b',');
                 out.extend_from_slice(buffer.format(value).as_bytes());
             }
-            out.extend_from_slice(b",,,,ok\n");
+            match found.sigma_mm {
+                None => out.extend_from_slice(b",,,"),
+                Some(sigma_mm) => {
+                    for value in sigma_mm {
+                        out.push(b',');
+                        out.extend_from_slice(buffer.format(value).as_bytes());
+                    }
+                }
+            }
+            out.extend_from_slice(b",ok\n");
         }
         Err(status) => {
             out.extend_from_slice(b",,,,,,,,");

@@ -45,6 +45,9 @@ pub struct Point<N> {
     pub point_mm: [N; 3],
     /// Length of the common perpendicular, mm.
     pub gap_mm: N,
+    /// Predicted standard deviation along each axis, mm: what the calibration leaves uncertain, and
+    /// pixel noise of the size of the corners'. `None` where the rig does not say.
+    pub sigma_mm: Option<[N; 3]>,
 }
 
 /// Turns matches into points.
@@ -84,6 +87,17 @@ impl<'a> RigSource<'a> {
             frame_from_rig,
         })
     }
+
+    /// Of two sightings only: a rig knows pairs.
+    fn sigma_mm(&self, sightings: &[Sighting<f64>]) -> Option<[f64; 3]> {
+        let [a, b] = *sightings else { return None };
+        let in_rig = self.rig.pair_covariance([pixel(a), pixel(b)])?.total_mm2();
+        let covariance_mm2 = match &self.frame_from_rig {
+            None => in_rig,
+            Some(frame) => frame.rotation * in_rig * frame.rotation.transpose(),
+        };
+        Some([0, 1, 2].map(|k| covariance_mm2[(k, k)].max(0.0).sqrt()))
+    }
 }
 
 impl PointSource for RigSource<'_> {
@@ -112,6 +126,7 @@ impl PointSource for RigSource<'_> {
         Ok(Point {
             point_mm: point_mm.into(),
             gap_mm: found.gap_mm,
+            sigma_mm: self.sigma_mm(sightings),
         })
     }
 }
@@ -174,6 +189,7 @@ impl PointSource for BlobSource<'_> {
         Ok(Point {
             point_mm: point_mm.into(),
             gap_mm: found.gap_mm(),
+            sigma_mm: None,
         })
     }
 }

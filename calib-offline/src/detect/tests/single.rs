@@ -206,17 +206,19 @@ fn an_image_of_another_size_or_no_image_is_refused_by_name() {
     );
     set.cameras[0].sensor = SensorSize::new(1280, 480);
     std::fs::write(folder.path().join("0_1.png"), b"no image").unwrap();
-    let found = detect(&set).unwrap();
-    let messages: Vec<String> = found
-        .images
-        .iter()
-        .map(|image| match &image.outcome {
-            Outcome::Refused(refusal) => refusal.to_string(),
-            used @ Outcome::Used { .. } => panic!("not refused: {used:?}"),
-        })
-        .collect();
-    assert!(messages[0].contains("0_0.png") && messages[0].contains("1280x480"));
-    assert!(messages[1].contains("0_1.png"));
+    let broken = |set: &Dataset| match detect(set).unwrap_err() {
+        DetectError::BrokenImage {
+            pose, more, source, ..
+        } => (pose, more, source.to_string()),
+        other => panic!("{other}"),
+    };
+    let (pose, more, message) = broken(&set);
+    assert_eq!((pose, more), (0, 1));
+    assert!(message.contains("0_0.png") && message.contains("1280x480"));
+    set.cameras[0].sensor = SENSOR;
+    let (pose, more, message) = broken(&set);
+    assert_eq!((pose, more), (1, 0));
+    assert!(message.contains("0_1.png"));
     set.cameras.clear();
     assert!(matches!(detect(&set).unwrap_err(), DetectError::NoImages));
 }

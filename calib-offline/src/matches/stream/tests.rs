@@ -20,6 +20,7 @@ impl PointSource for Sums {
         Ok(Point {
             point_mm: [u, v, sightings.len() as f64],
             gap_mm: 0.5,
+            sigma_mm: None,
         })
     }
 }
