@@ -93,8 +93,9 @@ fn one(arguments: &[String]) -> Result<()> {
     );
     if arguments.get(2).is_some() {
         match mrcal_seconds(&scene, &views, &estimate)? {
-            Some(theirs) => print!("  {theirs:>11.2}  {:>5.3}", own / theirs),
-            None => print!("  (mrcal is not installed)"),
+            Mrcal::Took(theirs) => print!("  {theirs:>11.2}  {:>5.3}", own / theirs),
+            Mrcal::Failed(theirs, says) => print!("  {theirs:>11.2}  (failed: {says})"),
+            Mrcal::Missing => print!("  (mrcal is not installed)"),
         }
     }
     println!();
@@ -142,11 +143,21 @@ fn cells() -> Result<()> {
     Ok(())
 }
 
-/// User time of mrcal's splined solve of the same corners; `None` if it is not installed.
-fn mrcal_seconds(scene: &Scene, views: &[View], estimate: &Estimate) -> Result<Option<f64>> {
+/// User time of mrcal's splined solve.
+enum Mrcal {
+    /// It ended well.
+    Took(f64),
+    /// It gave up, with its last words.
+    Failed(f64, String),
+    /// It is not installed.
+    Missing,
+}
+
+/// mrcal's splined solve of the same corners, its own checks of the result included.
+fn mrcal_seconds(scene: &Scene, views: &[View], estimate: &Estimate) -> Result<Mrcal> {
     const TOOL: &str = "mrcal-calibrate-cameras";
     if Command::new(TOOL).arg("--help").output().is_err() {
-        return Ok(None);
+        return Ok(Mrcal::Missing);
     }
     let folder = tempfile::tempdir()?;
     let corners = folder.path().join("corners.vnl");
@@ -181,9 +192,10 @@ fn mrcal_seconds(scene: &Scene, views: &[View], estimate: &Estimate) -> Result<O
     let seconds = children_cpu_seconds()? - before;
     if !output.status.success() {
         let says = String::from_utf8_lossy(&output.stderr);
-        return Err(format!("{TOOL}: {}", says.lines().last().unwrap_or_default()).into());
+        let last = says.lines().last().unwrap_or_default().to_string();
+        return Ok(Mrcal::Failed(seconds, last));
     }
-    Ok(Some(seconds))
+    Ok(Mrcal::Took(seconds))
 }
 
 /// Largest angle from the axis at the middles of the image's left and right edges.

@@ -154,13 +154,15 @@ pub fn view_sums(
                 pairs[(pair(count, a, b), idx)] = weight * j[a].dot(&j[b]);
             }
             let weighted = j[a] * weight;
-            for (entry, value) in crossed[a].column_mut(idx).iter_mut().zip(&row) {
+            let target = &mut crossed[a].as_mut_slice()[idx * small_len..][..small_len];
+            for (entry, value) in target.iter_mut().zip(&row) {
                 *entry = weighted.dot(value);
             }
         }
         for (k, value) in row.iter().enumerate() {
             let weighted = value * weight;
-            for (entry, other) in small.column_mut(k).iter_mut().zip(&row[..=k]) {
+            let target = &mut small.as_mut_slice()[k * small_len..][..=k];
+            for (entry, other) in target.iter_mut().zip(&row) {
                 *entry += weighted.dot(other);
             }
         }
@@ -168,7 +170,8 @@ pub fn view_sums(
     small.fill_lower_triangle_with_upper_triangle();
     let mut field = DMatrix::zeros(components.len(), components.len());
     let mut field_small = DMatrix::zeros(components.len(), small_len);
-    let mut scaled = DMatrix::zeros(basis.products().nrows(), n);
+    let term_count = basis.products().nrows();
+    let mut scaled = DMatrix::zeros(term_count, n);
     for (a, crossed) in crossed.iter().enumerate() {
         let (start, terms) = (components.start(a), components.terms(a));
         let products = basis.products().rows(0, terms);
@@ -180,13 +183,14 @@ pub fn view_sums(
         );
         for b in 0..=a {
             let other_terms = components.terms(b);
-            for (c, (mut column, source)) in scaled
-                .column_iter_mut()
-                .zip(basis.products().column_iter())
-                .enumerate()
+            let weights = pairs.row(pair(count, b, a));
+            for ((target, source), weight) in scaled
+                .as_mut_slice()
+                .chunks_exact_mut(term_count)
+                .zip(basis.products().as_slice().chunks_exact(term_count))
+                .zip(weights.iter())
             {
-                let weight = pairs[(pair(count, b, a), c)];
-                for (entry, product) in column.iter_mut().zip(source.iter()).take(other_terms) {
+                for (entry, product) in target.iter_mut().zip(source) {
                     *entry = weight * product;
                 }
             }

@@ -15,6 +15,8 @@ mod product;
 pub mod residual;
 pub mod robust;
 mod spline_block;
+#[cfg(test)]
+mod tests;
 
 pub use levenberg::{Outcome, StopReason};
 pub use model::{CameraModel, Model};
