@@ -103,6 +103,8 @@ pub fn corners(
 pub struct Checked {
     /// The calibration.
     pub calibration: Calibration,
+    /// What was offered to it, as recorded: no view left out, no pair taken apart.
+    pub offered: Observations,
     /// The estimates of the held-out check, for whoever wants to measure with them.
     pub folds: Folds,
 }
@@ -184,7 +186,11 @@ pub fn calibrate_corners(
         held_out: &held_out(&folds),
         thresholds: &settings.thresholds,
     });
-    Ok(Checked { calibration, folds })
+    Ok(Checked {
+        calibration,
+        offered: observations,
+        folds,
+    })
 }
 
 /// Every pose that is left out must be one: a slip in a number would leave the bad pose in.

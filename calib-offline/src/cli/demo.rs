@@ -3,6 +3,7 @@
 use super::Outcome;
 use super::calibrate::{FILES, Written, pack_settings, say_what_is_used, write_results};
 use super::output::Console;
+use crate::adjust::Observations;
 use crate::atomic_file::{self, check_folder};
 use crate::dataset::Dataset;
 use crate::demo::device::{check_cortex_m, check_simulated, corner_pairs};
@@ -38,8 +39,9 @@ without it; where the truth is known, matches.csv and holdout.csv against it. Th
 Exit code 1: a verdict is fail, or a device gave other bits than the host.
 
 With --json: schema calib-offline/demo/1, index, datasets, each with dataset, report, blob, the
-fields of calibrate, and measured: unseen_boards (folds, square_mm, neighbor_rms_percent,
-neighbor_rms_mm, neighbor_median_percent, rigid_rms_mm, points, outside, unmet, blob_error_px),
+fields of calibrate, and measured: unseen_boards (folds, square_mm, blob_error_px; as_recorded: all
+pairs, as_used: those that the calibration does not leave out, each with pairs,
+neighbor_rms_percent, neighbor_rms_mm, neighbor_median_percent, rigid_rms_mm, points, outside, unmet),
 known_points (file, matches, without_point, errors: points, direct_rms_mm, placed_rms_mm,
 oracle_rms_mm, direct_ratio, placed_ratio), devices (device, matches, points, different),
 no_cortex_m (why there is no Cortex-M among the devices).";
@@ -133,11 +135,14 @@ fn run_dataset(
     say_what_is_used(&dataset, console);
     let settings = CalibrateSettings::default();
     let corners = pipeline::corners(&dataset, &settings.detect, console.progress())?;
-    let Checked { calibration, folds } =
-        pipeline::calibrate_corners(&dataset, &corners, &settings, console.progress())?;
+    let Checked {
+        calibration,
+        offered,
+        folds,
+    } = pipeline::calibrate_corners(&dataset, &corners, &settings, console.progress())?;
     let written = write_results(place, calibration, console)?;
     console.progress().begin("measuring with the blob", 0);
-    let measured = measure(folder, &written, &folds);
+    let measured = measure(folder, &written, &folds, &offered);
     console.progress().end();
     let measured = measured?;
     let report = place.join(FILES[2]);
@@ -158,10 +163,15 @@ fn run_dataset(
 }
 
 /// Measures with the blob as it stands on the disk, and with those of the folds.
-fn measure(folder: &Path, written: &Written, folds: &Folds) -> Result<Measured, Error> {
+fn measure(
+    folder: &Path,
+    written: &Written,
+    folds: &Folds,
+    offered: &Observations,
+) -> Result<Measured, Error> {
     let calibration = &written.calibration;
     let settings = pack_settings(calibration, super::calibrate::BLOB_MAX_ERROR_PX);
-    let unseen_boards = measure_unseen(folds, &settings)?;
+    let unseen_boards = measure_unseen(folds, offered, &settings)?;
     let [_, rays, _] = &written.files;
     let bytes = read(rays)?;
     let blob = RayBlob::open(&bytes).map_err(DemoError::Open)?;

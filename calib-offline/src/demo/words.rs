@@ -1,5 +1,6 @@
 //! What was measured, line by line: for the terminal and for the page.
 
+use super::unseen::BoardFigures;
 use super::{DeviceCheck, KnownPoints, Measured, UnseenBoards};
 use crate::report::text::short;
 
@@ -22,22 +23,35 @@ pub fn lines(measured: &Measured) -> Vec<(String, String)> {
 }
 
 fn of_unseen(unseen: &UnseenBoards) -> String {
-    let unmet = match unseen.unmet {
+    let all = of_boards(&unseen.as_recorded, unseen.square_mm);
+    let without = match unseen.as_used.pairs {
+        pairs if pairs < unseen.as_recorded.pairs => format!(
+            "; without the pairs that the calibration leaves out: {}",
+            of_boards(&unseen.as_used, unseen.square_mm)
+        ),
+        _ => String::new(),
+    };
+    format!(
+        "{all}{without}; {} folds by pose, each measured by the runtime (f32) from a blob of its own",
+        unseen.folds
+    )
+}
+
+fn of_boards(figures: &BoardFigures, square_mm: f64) -> String {
+    let unmet = match figures.unmet {
         0 => String::new(),
         count => format!(", {count} with rays that do not meet"),
     };
     format!(
-        "{} % RMS, {} % median of the {} mm square between neighboring corners ({} mm RMS), \
-         {} mm RMS from the rigid board; {} points, {} outside{unmet}; {} folds by pose, each \
-         measured by the runtime (f32) from a blob of its own",
-        short(unseen.neighbor_rms_percent),
-        short(unseen.neighbor_median_percent),
-        unseen.square_mm,
-        short(unseen.neighbor_rms_mm),
-        short(unseen.rigid_rms_mm),
-        unseen.points,
-        unseen.outside,
-        unseen.folds,
+        "{} % RMS, {} % median of the {square_mm} mm square between neighboring corners ({} mm \
+         RMS), {} mm RMS from the rigid board; {} pairs, {} points, {} outside{unmet}",
+        short(figures.neighbor_rms_percent),
+        short(figures.neighbor_median_percent),
+        short(figures.neighbor_rms_mm),
+        short(figures.rigid_rms_mm),
+        figures.pairs,
+        figures.points,
+        figures.outside,
     )
 }
 

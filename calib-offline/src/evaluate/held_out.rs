@@ -59,6 +59,8 @@ pub struct BoardErrors {
     pub neighbor_errors: Vec<f64>,
     /// Distance of triangulated corners from the best-placed flat board, mm.
     pub rigid_errors_mm: Vec<f64>,
+    /// Boards that two cameras saw.
+    pub board_count: usize,
     /// Corners triangulated.
     pub point_count: usize,
     /// Corners seen by two cameras that one of them has no ray for.
@@ -72,6 +74,7 @@ impl BoardErrors {
     pub fn add(&mut self, other: Self) {
         self.neighbor_errors.extend(other.neighbor_errors);
         self.rigid_errors_mm.extend(other.rigid_errors_mm);
+        self.board_count += other.board_count;
         self.point_count += other.point_count;
         self.outside_count += other.outside_count;
         self.unmet_count += other.unmet_count;
@@ -172,6 +175,7 @@ pub fn measure_boards<S: PointSource>(source: &S, unseen: &Observations) -> Boar
         let [left, right, ..] = views[..] else {
             continue;
         };
+        result.board_count += 1;
         let mut board = MeasuredBoard::default();
         for corner in &left.corners {
             let other = right
