@@ -4,6 +4,7 @@ use calib_offline::adjust::Observations;
 use calib_offline::board::BoardSpec;
 use calib_offline::dataset::View;
 use calib_offline::evaluate::measured_board::best_placement;
+use calib_offline::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
 use calib_offline::geometry::{RigidTransform, so3};
 use calib_offline::init::rig::start_rig;
 use calib_offline::init::screening::{Finding, FindingKind};
@@ -15,6 +16,11 @@ use rand_chacha::ChaCha8Rng;
 
 /// Points that each comparison measures.
 const MATCHES: usize = 3000;
+/// Of the cameras, as nothing else names them.
+const NAMES: [&str; 2] = ["left", "right"];
+/// Quantiles of a chi-square variable of 3 degrees of freedom at 68 % and 95 %.
+const CHI_SQUARE_68: f64 = 3.5059;
+const CHI_SQUARE_95: f64 = 7.8147;
 
 /// The standard dataset of a rig with 0.05 px of noise, changed.
 pub fn scene(optics: OpticsKind, change: impl FnOnce(&mut SceneSettings)) -> Scene {
@@ -105,30 +111,99 @@ pub struct Measured {
 
 /// Measures random points and held-out boards; with noisy pixels or with exact ones.
 pub fn measure(scene: &Scene, estimate: &Estimate, noisy: bool) -> Measured {
-    let rig = estimate.rig(&["left".to_owned(), "right".to_owned()]);
-    let (mut measured, mut truth, mut limit, mut outside) = (vec![], vec![], 0.0, 0);
+    let (mut points, mut outside) = (Vec::new(), 0);
     for set in [MatchSet::Points, MatchSet::Holdout] {
-        for m in scene.matches(set, MATCHES) {
-            let pixels = if noisy { &m.pixels } else { &m.true_pixels };
-            match rig.triangulate(&[(0, pixels[0]), (1, pixels[1])]) {
-                Ok(point) => {
-                    measured.push(point.point_mm);
-                    truth.push(m.point_in_datum);
-                    limit += (m.oracle_in_datum - m.point_in_datum).norm_squared();
-                }
-                Err(_) => outside += 1,
-            }
-        }
+        let (measured, left_out) = measured_points(scene, estimate, set, noisy);
+        points.extend(measured);
+        outside += left_out;
     }
-    let placement = best_placement(&measured, &truth).unwrap();
-    let squared: f64 = measured
-        .iter()
-        .zip(&truth)
-        .map(|(p, q)| (placement.point(p) - q).norm_squared())
-        .sum();
+    let errors = compare_with_truth(&points).unwrap();
     Measured {
-        error_mm: (squared / measured.len() as f64).sqrt(),
-        ratio: (squared / limit).sqrt(),
+        error_mm: errors.placed_rms_mm,
+        ratio: errors.placed_ratio,
         outside,
+    }
+}
+
+/// Errors of one set of matches with noisy pixels, and the share that was not measured.
+pub fn measure_set(scene: &Scene, estimate: &Estimate, set: MatchSet) -> (TruthErrors, f64) {
+    let (points, outside) = measured_points(scene, estimate, set, true);
+    let share = outside as f64 / (points.len() + outside) as f64;
+    (compare_with_truth(&points).unwrap(), share)
+}
+
+fn measured_points(
+    scene: &Scene,
+    estimate: &Estimate,
+    set: MatchSet,
+    noisy: bool,
+) -> (Vec<PointWithTruth>, usize) {
+    let rig = estimate.rig(&NAMES.map(str::to_owned));
+    let matches = scene.matches(set, MATCHES);
+    let points: Vec<PointWithTruth> = matches
+        .iter()
+        .filter_map(|m| {
+            let pixels = if noisy { &m.pixels } else { &m.true_pixels };
+            let point = rig.triangulate(&[(0, pixels[0]), (1, pixels[1])]).ok()?;
+            Some(PointWithTruth {
+                measured_mm: point.point_mm,
+                true_mm: m.point_in_datum,
+                oracle_mm: m.oracle_in_datum,
+            })
+        })
+        .collect();
+    let outside = matches.len() - points.len();
+    (points, outside)
+}
+
+/// How often errors lie inside their predicted ellipsoids.
+#[derive(Debug, Clone, Copy)]
+pub struct Coverage {
+    /// Share of errors inside the ellipsoid of 68 %, with the noise of pixels.
+    pub within_68: f64,
+    /// The same of 95 %.
+    pub within_95: f64,
+    /// Squared errors with exact pixels over the predicted part of the calibration, both summed.
+    pub calibration_squared: f64,
+}
+
+/// Measures matches and compares their errors with what was predicted. The uncertainty is that of
+/// shape: a rigid motion of the whole rig is taken out.
+pub fn coverage(scene: &Scene, estimate: &mut Estimate, set: MatchSet) -> Coverage {
+    let mut rig = estimate.rig(&NAMES.map(str::to_owned));
+    estimate.fill_uncertainty(&mut rig).unwrap();
+    let matches = scene.matches(set, MATCHES);
+    let errors = |noisy: bool| -> Vec<(Vector3<f64>, _)> {
+        let measured: Vec<(Vector3<f64>, Vector3<f64>, _)> = matches
+            .iter()
+            .filter_map(|m| {
+                let pixels = if noisy { &m.pixels } else { &m.true_pixels };
+                let pair = [(0, pixels[0]), (1, pixels[1])];
+                let point = rig.triangulate(&pair).ok()?.point_mm;
+                Some((point, m.point_in_datum, rig.pair_covariance(pair)?))
+            })
+            .collect();
+        let (from, to): (Vec<_>, Vec<_>) = measured.iter().map(|m| (m.0, m.1)).unzip();
+        let placement = best_placement(&from, &to).unwrap();
+        measured
+            .into_iter()
+            .map(|(point, truth, covariance)| (placement.point(&point) - truth, covariance))
+            .collect()
+    };
+    let noisy = errors(true);
+    let share_within = |limit: f64| {
+        let within = noisy.iter().filter(|(error, covariance)| {
+            let inverse = covariance.total_mm2().try_inverse().unwrap();
+            error.dot(&(inverse * error)) < limit
+        });
+        within.count() as f64 / noisy.len() as f64
+    };
+    let exact = errors(false);
+    let squared: f64 = exact.iter().map(|(error, _)| error.norm_squared()).sum();
+    let predicted: f64 = exact.iter().map(|(_, c)| c.calibration_mm2.trace()).sum();
+    Coverage {
+        within_68: share_within(CHI_SQUARE_68),
+        within_95: share_within(CHI_SQUARE_95),
+        calibration_squared: squared / predicted,
     }
 }
