@@ -25,10 +25,7 @@ fn yaw(sin: f64, cos: f64) -> Matrix3<f64> {
 /// products, quotients and square roots go into them, so that every machine packs the same bits.
 fn golden_rig() -> Rig {
     let sensor = SensorSize::new(64, 48);
-    let base = BaseLens {
-        projection: Projection::Perspective,
-        focal_px: 60.0,
-    };
+    let base = BaseLens::ideal(Projection::Perspective, 60.0);
     let mut left = RayField::ideal(sensor, base, 3);
     left.direction.polynomial.coefficients[7] = Vector2::new(0.01, -0.005);
     let mut spline = Spline::zero(SplineGrid {

@@ -3,7 +3,6 @@
 use super::knots::KnotOrder;
 use super::observations::{Observations, ViewBasis};
 use crate::board::BoardShape;
-use crate::field::polynomial::{Polynomial, legendre_norms};
 use crate::field::structured::StructuredBasis;
 use crate::field::{RayField, SmoothMap};
 use crate::geometry::RigidTransform;
@@ -32,6 +31,8 @@ pub struct CameraModel {
     pub field: RayField,
     /// Directions in which the field's polynomial may move.
     pub basis: StructuredBasis,
+    /// Directions in which the offset may move; there if the field has one.
+    pub offset_basis: Option<StructuredBasis>,
     /// Where the camera is.
     pub camera_from_rig: RigidTransform,
 }
@@ -46,18 +47,30 @@ impl CameraModel {
             .map(|spline| KnotOrder::new(spline.grid))
     }
 
-    /// Amounts of the offset's normalized Legendre products, mm RMS over the sensor: x of all
-    /// terms, then y of all terms; empty for a central camera.
+    /// Gives the camera an offset field, zero everywhere, that may move from now on.
+    pub fn free_offset(&mut self, degree: usize) {
+        let field = &mut self.field;
+        self.offset_basis = Some(StructuredBasis::offset(field.sensor, degree, &field.base));
+        field.offset = Some(SmoothMap::zero(degree));
+    }
+
+    /// Makes the camera central.
+    pub fn drop_offset(&mut self) {
+        self.field.offset = None;
+        self.offset_basis = None;
+    }
+
+    /// The offset with what it may do; `None` for a central camera.
+    pub fn offset(&self) -> Option<(&SmoothMap, &StructuredBasis)> {
+        self.field.offset.as_ref().zip(self.offset_basis.as_ref())
+    }
+
+    /// Amounts of the offset's directions, mm RMS over the sensor; empty for a central camera.
     pub fn offset_amounts(&self) -> DVector<f64> {
-        let Some(offset) = &self.field.offset else {
-            return DVector::zeros(0);
-        };
-        let polynomial = &offset.polynomial;
-        let norms = legendre_norms(polynomial.degree);
-        let terms = polynomial.coefficients.len();
-        DVector::from_fn(2 * terms, |k, _| {
-            polynomial.coefficients[k % terms][k / terms] * norms[k % terms]
-        })
+        self.offset().map_or_else(
+            || DVector::zeros(0),
+            |(offset, basis)| basis.amounts(&offset.polynomial),
+        )
     }
 
     /// The spline's coefficients in knot order, two components interleaved.
@@ -125,7 +138,7 @@ impl Model {
             .enumerate()
             .map(|(idx, camera)| CameraLayout {
                 direction: take(camera.basis.len()),
-                offset: take(camera.offset_amounts().len()),
+                offset: take(camera.offset().map_or(0, |(_, basis)| basis.len())),
                 extrinsics: (idx > 0).then(|| take(6)),
             })
             .collect();
@@ -149,9 +162,9 @@ impl Model {
             camera
                 .basis
                 .add_to(&amounts, &mut camera.field.direction.polynomial);
-            if let Some(offset) = &mut camera.field.offset {
-                let change = step.global.rows_range(ranges.offset.clone());
-                add_offset(change.as_slice(), &mut offset.polynomial);
+            if let (Some(offset), Some(basis)) = (&mut camera.field.offset, &camera.offset_basis) {
+                let change = step.global.rows_range(ranges.offset.clone()).into_owned();
+                basis.add_to(&change, &mut offset.polynomial);
             }
             if let Some(order) = camera.knot_order() {
                 add_spline(&order, &step.splines[idx], &mut camera.field.direction);
@@ -198,15 +211,6 @@ impl Model {
             .iter()
             .map(|view| ViewBasis::new(view, &self.cameras[view.camera_idx].field))
             .collect()
-    }
-}
-
-/// Adds a change of [`CameraModel::offset_amounts`].
-fn add_offset(change: &[f64], polynomial: &mut Polynomial) {
-    let norms = legendre_norms(polynomial.degree);
-    let terms = polynomial.coefficients.len();
-    for (k, c) in polynomial.coefficients.iter_mut().enumerate() {
-        *c += Vector2::new(change[k], change[terms + k]) / norms[k];
     }
 }
 

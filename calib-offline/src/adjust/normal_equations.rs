@@ -13,7 +13,7 @@ use super::cholesky::{BandedCholesky, gram};
 use super::model::{CameraModel, Layout, Model, Step};
 use super::observations::{Observations, ViewBasis};
 use super::spline_block::{BorderColumns, EliminatedSpline, SplineBlock};
-use crate::field::polynomial::legendre_norms;
+use crate::field::structured::StructuredBasis;
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, Vector2, Vector6};
 use rayon::prelude::*;
 
@@ -609,25 +609,22 @@ fn fixed_columns(layout: &Layout, camera_idx: usize) -> impl Iterator<Item = Opt
 /// to the coefficients of its components (rows, see [`Components`]).
 pub(super) fn parameters_to_columns(camera: &CameraModel) -> DMatrix<f64> {
     let components = Components::of(camera);
-    let direction = camera.basis.coefficients();
-    let offset_len = camera.offset_amounts().len();
-    let mut map = DMatrix::zeros(components.len(), direction.ncols() + offset_len);
-    for component in 0..2 {
-        for k in 0..components.terms(component) {
-            let source = direction.row(2 * k + component);
-            map.view_mut((components.start(component) + k, 0), (1, direction.ncols()))
-                .copy_from(&source);
-        }
-    }
-    if let Some(offset) = &camera.field.offset {
-        let norms = legendre_norms(offset.polynomial.degree);
-        for component in 2..4 {
-            let terms = components.terms(component);
-            for k in 0..terms {
-                let column = direction.ncols() + (component - 2) * terms + k;
-                map[(components.start(component) + k, column)] = 1.0 / norms[k];
+    let bases = [Some(&camera.basis), camera.offset().map(|(_, basis)| basis)];
+    let parameters = bases.iter().flatten().map(|basis| basis.len()).sum();
+    let mut map = DMatrix::zeros(components.len(), parameters);
+    let mut first = 0;
+    for (part, basis) in bases.into_iter().enumerate() {
+        let Some(coefficients) = basis.map(StructuredBasis::coefficients) else {
+            continue;
+        };
+        for component in 0..2 {
+            let start = components.start(2 * part + component);
+            for k in 0..components.terms(2 * part + component) {
+                map.view_mut((start + k, first), (1, coefficients.ncols()))
+                    .copy_from(&coefficients.row(2 * k + component));
             }
         }
+        first += coefficients.ncols();
     }
     map
 }

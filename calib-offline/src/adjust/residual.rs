@@ -51,10 +51,7 @@ mod tests {
     use crate::geometry::{PixelPoint, SensorSize};
 
     fn field() -> RayField {
-        let base = BaseLens {
-            projection: Projection::Perspective,
-            focal_px: 700.0,
-        };
+        let base = BaseLens::ideal(Projection::Perspective, 700.0);
         let mut field = RayField::ideal(SensorSize::new(640, 480), base, 3);
         field.direction.polynomial.coefficients[7] = Vector2::new(1e-3, -2e-3);
         let mut offset = SmoothMap::zero(1);

@@ -26,10 +26,7 @@ fn wild(k: usize) -> f64 {
 }
 
 fn camera(idx: usize, has_offset: bool, has_spline: bool) -> CameraModel {
-    let base = BaseLens {
-        projection: Projection::Perspective,
-        focal_px: 420.0,
-    };
+    let base = BaseLens::ideal(Projection::Perspective, 420.0);
     let mut field = RayField::ideal(SENSOR, base, 3);
     for (k, c) in field
         .direction
@@ -56,6 +53,7 @@ fn camera(idx: usize, has_offset: bool, has_spline: bool) -> CameraModel {
     }
     CameraModel {
         basis: StructuredBasis::new(SENSOR, 3, None),
+        offset_basis: has_offset.then(|| StructuredBasis::offset(SENSOR, 2, &base)),
         field,
         camera_from_rig: if idx == 0 {
             RigidTransform::identity()

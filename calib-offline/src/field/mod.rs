@@ -1,6 +1,8 @@
 //! The ray field: for every pixel a line in space, with no assumption that the lines meet.
 
+pub mod base_lens;
 pub mod coverage;
+pub mod lens_fit;
 pub mod polynomial;
 pub mod projection;
 pub mod ray_field;
@@ -10,7 +12,8 @@ pub mod structured;
 pub mod transport;
 pub mod uncertainty;
 
+pub use base_lens::{BaseLens, Projection};
 pub use coverage::CoverageMask;
-pub use ray_field::{BaseLens, FieldSample, Projection, RayField, SmoothMap};
+pub use ray_field::{FieldSample, RayField, SmoothMap};
 pub use rig::{CalibratedCamera, MeasureError, Rig};
 pub use uncertainty::PairUncertainty;

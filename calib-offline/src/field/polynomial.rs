@@ -63,13 +63,6 @@ pub fn basis(sensor: SensorSize, degree: usize, pixel: PixelPoint, out: &mut Vec
     }));
 }
 
-/// RMS of each product over the sensor, in the order of [`terms`]: `1 / sqrt((2i + 1)(2j + 1))`.
-pub fn legendre_norms(degree: usize) -> Vec<f64> {
-    terms(degree)
-        .map(|(i, j)| 1.0 / (((2 * i + 1) * (2 * j + 1)) as f64).sqrt())
-        .collect()
-}
-
 /// A polynomial map from the sensor to two numbers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Polynomial {

@@ -76,10 +76,7 @@ mod tests {
             (Projection::Perspective, 700.0),
             (Projection::Equidistant, 230.0),
         ] {
-            let base = BaseLens {
-                projection,
-                focal_px,
-            };
+            let base = BaseLens::ideal(projection, focal_px);
             let mut field = RayField::ideal(SensorSize::new(640, 480), base, 3);
             field.direction.polynomial.coefficients[7] = Vector2::new(5e-3, -2e-3);
             let mut offset = SmoothMap::zero(1);

@@ -1,60 +1,12 @@
 //! The ray field of one camera: the type that estimation, evaluation and packing share.
 
+use super::base_lens::BaseLens;
 use super::polynomial::Polynomial;
 use super::spline::Spline;
 use super::transport;
 use crate::geometry::{PixelPoint, Ray, SensorSize};
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
-
-/// How the base lens maps the angle off axis to a radius on the sensor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Projection {
-    /// `radius = f tan(theta)`.
-    Perspective,
-    /// `radius = f theta`.
-    Equidistant,
-}
-
-/// The ideal lens from which the field's direction deviates. It is fixed by the initialization and
-/// has no say in the result: it only leaves the polynomial a small smooth difference to follow.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct BaseLens {
-    /// Kind of lens.
-    pub projection: Projection,
-    /// Focal length, px.
-    pub focal_px: f64,
-}
-
-impl BaseLens {
-    /// Half-angle vector of the direction at an offset from the image center, px, and its
-    /// derivative per px.
-    pub fn evaluate(&self, offset_px: &Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
-        let x = offset_px / self.focal_px;
-        let r2 = x.norm_squared();
-        let r = r2.sqrt();
-        // s = g x with g(r) = 2 tan(theta/2) / r, and h = g'(r) / r.
-        let (g, h) = match self.projection {
-            Projection::Perspective => {
-                let root = (1.0 + r2).sqrt();
-                let g = 2.0 / (1.0 + root);
-                (g, -2.0 / (root * (1.0 + root) * (1.0 + root)))
-            }
-            Projection::Equidistant => {
-                if r < 1e-3 {
-                    (1.0 + r2 / 12.0, 1.0 / 6.0 + r2 / 30.0)
-                } else {
-                    let t = (r / 2.0).tan();
-                    let g = 2.0 * t / r;
-                    (g, ((1.0 + t * t) - g) / r2)
-                }
-            }
-        };
-        let derivative = (Matrix2::identity() * g + x * x.transpose() * h) / self.focal_px;
-        (x * g, derivative)
-    }
-}
 
 /// A smooth map from the sensor to two numbers: polynomial plus spline deviation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -172,57 +124,11 @@ impl RayField {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector3;
-
-    #[test]
-    fn perspective_base_lens_is_the_pinhole() {
-        let base = BaseLens {
-            projection: Projection::Perspective,
-            focal_px: 500.0,
-        };
-        let (s, _) = base.evaluate(&Vector2::new(300.0, -200.0));
-        let expected = Vector3::new(300.0, -200.0, 500.0).normalize();
-        assert!((transport::direction(&s).normalize() - expected).norm() < 1e-15);
-    }
-
-    #[test]
-    fn equidistant_base_lens_reaches_ninety_degrees_at_its_radius() {
-        let base = BaseLens {
-            projection: Projection::Equidistant,
-            focal_px: 100.0,
-        };
-        let (s, _) = base.evaluate(&Vector2::new(50.0 * std::f64::consts::PI, 0.0));
-        assert!((s - Vector2::new(2.0, 0.0)).norm() < 1e-14);
-    }
-
-    #[test]
-    fn base_derivative_matches_differences() {
-        for projection in [Projection::Perspective, Projection::Equidistant] {
-            let base = BaseLens {
-                projection,
-                focal_px: 400.0,
-            };
-            for offset in [[0.0, 0.0], [0.3, 0.1], [350.0, -120.0], [10.0, 600.0]] {
-                let offset = Vector2::from(offset);
-                let (_, derivative) = base.evaluate(&offset);
-                for k in 0..2 {
-                    let mut step = Vector2::zeros();
-                    step[k] = 1e-4;
-                    let difference = (base.evaluate(&(offset + step)).0
-                        - base.evaluate(&(offset - step)).0)
-                        / 2e-4;
-                    assert!((difference - derivative.column(k)).norm() < 1e-10);
-                }
-            }
-        }
-    }
+    use crate::field::Projection;
 
     #[test]
     fn offset_moves_the_origin_across_the_ray() {
-        let base = BaseLens {
-            projection: Projection::Perspective,
-            focal_px: 500.0,
-        };
+        let base = BaseLens::ideal(Projection::Perspective, 500.0);
         let mut field = RayField::ideal(SensorSize::new(640, 480), base, 3);
         let mut offset = SmoothMap::zero(0);
         offset.polynomial.coefficients[0] = Vector2::new(3.0, 4.0);

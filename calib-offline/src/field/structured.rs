@@ -7,14 +7,18 @@
 //! asks for it. All directions are orthonormal over the sensor, so a coefficient is the RMS
 //! change of the half-angle vector that it makes.
 
+use super::base_lens::BaseLens;
 use super::polynomial::{self, Polynomial};
-use super::ray_field::BaseLens;
 use crate::geometry::{PixelPoint, SensorSize};
 use nalgebra::{DMatrix, DVector, Vector2};
+use std::ops::RangeInclusive;
 
 /// Directions of the first kind that rotate the camera frame (two shifts of the center's
 /// direction, one turn about the axis): they are held, as poses and extrinsics can do the same.
 const GAUGE_DIRECTIONS: usize = 3;
+
+/// Degrees of an offset field up to this share one smoothness weight.
+pub const OFFSET_CORE_DEGREE: usize = 3;
 
 /// Lattice nodes along the longer side, for inner products over the sensor.
 const LATTICE: usize = 33;
@@ -33,11 +37,10 @@ pub struct StructuredBasis {
 }
 
 impl StructuredBasis {
-    /// The basis over a sensor. `profile` is the radial profile found so far: with it, the two
-    /// directions that shift the center of the whole radial mapping are free too.
-    pub fn new(sensor: SensorSize, degree: usize, profile: Option<&RadialProfile>) -> Self {
+    /// The basis over a sensor. Radial terms are about its middle, or about the center of a `lens`
+    /// that is known well; then the two directions that shift the lens are free too.
+    pub fn new(sensor: SensorSize, degree: usize, lens: Option<&BaseLens>) -> Self {
         let lattice = Lattice::new(sensor, degree);
-        let terms: Vec<(usize, usize)> = polynomial::terms(degree).collect();
         let mut builder = Builder {
             lattice: &lattice,
             orthonormal: Vec::new(),
@@ -52,15 +55,15 @@ impl StructuredBasis {
             |_, y| Vector2::new(y, 0.0),
             |_, y| Vector2::new(0.0, y),
         ];
+        let half_width_px = f64::from(sensor.width) / 2.0;
+        let center = lens.map_or(Vector2::zeros(), |lens| center_in_half_widths(sensor, lens));
+        let about_center = |f: &dyn Fn(f64, f64) -> Vector2<f64>| {
+            lattice.project(|x, y| f(x - center.x, y - center.y))
+        };
         for f in affine {
             builder.add(&lattice.project(f), None);
         }
-        for k in (1..=3).filter(|k| 2 * k < degree) {
-            builder.add(
-                &lattice.project(|x, y| Vector2::new(x, y) * (x * x + y * y).powi(k as i32)),
-                None,
-            );
-        }
+        builder.add_radial(degree, &center);
         let decentering: [fn(f64, f64) -> Vector2<f64>; 4] = [
             |x, y| Vector2::new(3.0 * x * x + y * y, 2.0 * x * y),
             |x, y| Vector2::new(2.0 * x * y, x * x + 3.0 * y * y),
@@ -68,30 +71,34 @@ impl StructuredBasis {
             |x, y| Vector2::new(x * y, y * y),
         ];
         for f in decentering {
-            builder.add(&lattice.project(f), None);
+            builder.add(&about_center(&f), None);
         }
-        if let Some(profile) = profile {
+        if let Some(lens) = lens {
             for axis in 0..2 {
-                builder.add(
-                    &lattice.project(|x, y| profile.center_shift(&Vector2::new(x, y), axis)),
-                    None,
-                );
+                let shift = |x: f64, y: f64| {
+                    let (_, derivative) = lens.evaluate(&(Vector2::new(x, y) * half_width_px));
+                    derivative.column(axis) * half_width_px
+                };
+                builder.add(&lattice.project(shift), None);
             }
         }
-        for total in 2..=degree {
-            for (k, _) in terms
-                .iter()
-                .enumerate()
-                .filter(|(_, (i, j))| i + j == total)
-            {
-                for component in 0..2 {
-                    let mut single = DVector::zeros(2 * terms.len());
-                    single[2 * k + component] = 1.0;
-                    builder.add(&single, Some(total));
-                }
-            }
-        }
-        builder.finish(degree)
+        builder.add_degrees(2..=degree, degree, |total| total);
+        builder.finish(degree, GAUGE_DIRECTIONS)
+    }
+
+    /// The basis of an offset field, mm, over a sensor: first the radial terms `r^2k (x, y)`, k =
+    /// 1..3, about the center of the lens, by which a pupil moves with the angle (tagged `None`),
+    /// then everything else by degree, up to [`OFFSET_CORE_DEGREE`] as one. Nothing is cut off.
+    pub fn offset(sensor: SensorSize, degree: usize, lens: &BaseLens) -> Self {
+        let lattice = Lattice::new(sensor, degree);
+        let mut builder = Builder {
+            lattice: &lattice,
+            orthonormal: Vec::new(),
+            penalized_degree: Vec::new(),
+        };
+        builder.add_radial(degree, &center_in_half_widths(sensor, lens));
+        builder.add_degrees(0..=degree, degree, |total| total.max(OFFSET_CORE_DEGREE));
+        builder.finish(degree, 0)
     }
 
     /// Number of directions.
@@ -133,50 +140,8 @@ impl StructuredBasis {
     }
 }
 
-/// The radial part of a direction field: `F(p) = base(p) + p * sum_k a_k |p|^2k`, k = 1..3, with
-/// `p` the offset from the image center in half widths.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RadialProfile {
-    base: BaseLens,
-    half_width_px: f64,
-    a: [f64; 3],
-}
-
-impl RadialProfile {
-    /// Reads the profile from a field's base lens and polynomial.
-    pub fn of(sensor: SensorSize, base: BaseLens, polynomial: &Polynomial) -> Self {
-        // Least squares of the polynomial's radial part on the three terms plus the linear one.
-        let half_width_px = f64::from(sensor.width) / 2.0;
-        let mut normal = nalgebra::Matrix4::zeros();
-        let mut right = nalgebra::Vector4::zeros();
-        for (pixel, p) in lattice_nodes(sensor) {
-            let r2 = p.norm_squared();
-            let (value, _) = polynomial.evaluate(sensor, pixel);
-            let row = nalgebra::Vector4::new(1.0, r2, r2 * r2, r2 * r2 * r2);
-            normal += row * row.transpose() * r2;
-            right += row * value.dot(&p);
-        }
-        let a = normal
-            .cholesky()
-            .map_or(nalgebra::Vector4::zeros(), |c| c.solve(&right));
-        Self {
-            base,
-            half_width_px,
-            a: [a[1], a[2], a[3]],
-        }
-    }
-
-    /// Derivative of `F` along one axis: what shifting its center does, per half width.
-    fn center_shift(&self, p: &Vector2<f64>, axis: usize) -> Vector2<f64> {
-        let (_, base) = self.base.evaluate(&(p * self.half_width_px));
-        let r2 = p.norm_squared();
-        let [a1, a2, a3] = self.a;
-        let g = r2 * (a1 + r2 * (a2 + r2 * a3));
-        let dg = 2.0 * (a1 + r2 * (2.0 * a2 + r2 * 3.0 * a3));
-        let mut shift = base.column(axis) * self.half_width_px + p * (dg * p[axis]);
-        shift[axis] += g;
-        shift
-    }
+fn center_in_half_widths(sensor: SensorSize, lens: &BaseLens) -> Vector2<f64> {
+    Vector2::from(lens.center_px) / (f64::from(sensor.width) / 2.0)
 }
 
 /// Nodes of a regular lattice over the sensor: the pixel and its offset from the image center in
@@ -289,8 +254,43 @@ impl Builder<'_> {
         }
     }
 
-    fn finish(self, degree: usize) -> StructuredBasis {
-        let kept = &self.orthonormal[GAUGE_DIRECTIONS..];
+    /// The radial terms that fit into a degree, free.
+    fn add_radial(&mut self, degree: usize, center: &Vector2<f64>) {
+        for k in (1..=3).filter(|k| 2 * k < degree) {
+            let term = self.lattice.project(|x, y| {
+                let p = Vector2::new(x, y) - center;
+                p * p.norm_squared().powi(k as i32)
+            });
+            self.add(&term, None);
+        }
+    }
+
+    /// Every Legendre product of some total degrees, under the weight that `tag` names.
+    fn add_degrees(
+        &mut self,
+        totals: RangeInclusive<usize>,
+        degree: usize,
+        tag: fn(usize) -> usize,
+    ) {
+        let terms: Vec<(usize, usize)> = polynomial::terms(degree).collect();
+        for total in totals {
+            let of_total = terms
+                .iter()
+                .enumerate()
+                .filter(|(_, (i, j))| i + j == total);
+            for (k, _) in of_total {
+                for component in 0..2 {
+                    let mut single = DVector::zeros(2 * terms.len());
+                    single[2 * k + component] = 1.0;
+                    self.add(&single, Some(tag(total)));
+                }
+            }
+        }
+    }
+
+    /// The basis without the first `cut` directions.
+    fn finish(self, degree: usize, cut: usize) -> StructuredBasis {
+        let kept = &self.orthonormal[cut..];
         let rows = 2 * polynomial::term_count(degree);
         let mut coefficients = DMatrix::zeros(rows, kept.len());
         let mut dual = DMatrix::zeros(kept.len(), rows);
@@ -304,7 +304,7 @@ impl Builder<'_> {
             degree,
             coefficients,
             dual,
-            penalized_degree: self.penalized_degree[GAUGE_DIRECTIONS..].to_vec(),
+            penalized_degree: self.penalized_degree[cut..].to_vec(),
         }
     }
 }
@@ -377,34 +377,35 @@ mod tests {
     }
 
     #[test]
-    fn shifted_profile_is_free_to_first_order() {
-        let base = BaseLens {
-            projection: Projection::Equidistant,
-            focal_px: 250.0,
+    fn a_shift_of_a_lens_is_free_to_first_order() {
+        let lens = BaseLens {
+            center_px: [14.0, -8.0],
+            radial: [0.1, -0.03, 0.01, 0.0],
+            reach: 1.7,
+            ..BaseLens::ideal(Projection::Equidistant, 450.0)
         };
-        let profile = RadialProfile {
-            base,
-            half_width_px: 320.0,
-            a: [0.1, -0.03, 0.01],
-        };
-        let p = Vector2::new(0.6, -0.3);
-        let f = |p: &Vector2<f64>| {
-            let r2 = p.norm_squared();
-            base.evaluate(&(p * 320.0)).0 + p * (0.1 * r2 - 0.03 * r2 * r2 + 0.01 * r2.powi(3))
-        };
+        let basis = StructuredBasis::new(SENSOR, 7, Some(&lens));
+        let free = basis.penalized_degrees().iter().filter(|d| d.is_none());
+        assert_eq!(free.count(), 12);
+        let lattice = Lattice::new(SENSOR, 7);
         for axis in 0..2 {
             let mut step = Vector2::zeros();
-            step[axis] = 1e-5;
-            let difference = (f(&(p + step)) - f(&(p - step))) / 2e-5;
-            assert!((difference - profile.center_shift(&p, axis)).norm() < 1e-9);
+            step[axis] = 1e-3;
+            let at = |x: f64, y: f64, sign: f64| {
+                lens.evaluate(&(Vector2::new(x, y) * 320.0 + step * sign)).0
+            };
+            let shift = lattice.project(|x, y| (at(x, y, 1.0) - at(x, y, -1.0)) * 1e3);
+            let terms = polynomial::term_count(7);
+            let polynomial = Polynomial {
+                degree: 7,
+                coefficients: (0..terms)
+                    .map(|k| Vector2::new(shift[2 * k], shift[2 * k + 1]))
+                    .collect(),
+            };
+            let amounts = basis.amounts(&polynomial);
+            for (amount, penalized) in amounts.iter().zip(basis.penalized_degrees()) {
+                assert!(penalized.is_none() || amount.abs() < 1e-8 * amounts.norm());
+            }
         }
-        assert_eq!(
-            StructuredBasis::new(SENSOR, 7, Some(&profile))
-                .penalized_degrees()
-                .iter()
-                .filter(|d| d.is_none())
-                .count(),
-            12
-        );
     }
 }

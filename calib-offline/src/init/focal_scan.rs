@@ -136,11 +136,9 @@ fn scan(trial: &Observations, sensor: SensorSize) -> Vec<Candidate> {
     let lenses: Vec<BaseLens> = [Projection::Perspective, Projection::Equidistant]
         .into_iter()
         .flat_map(|projection| {
-            (0..FOCAL_COUNT).map(move |k| BaseLens {
-                projection,
-                focal_px: longer_px
-                    * first
-                    * (last / first).powf(k as f64 / (FOCAL_COUNT - 1) as f64),
+            (0..FOCAL_COUNT).map(move |k| {
+                let share = k as f64 / (FOCAL_COUNT - 1) as f64;
+                BaseLens::ideal(projection, longer_px * first * (last / first).powf(share))
             })
         })
         .collect();
@@ -216,6 +214,7 @@ fn adjust_cubic(
     iterations: usize,
 ) -> Option<(Model, f64)> {
     let camera = CameraModel {
+        offset_basis: None,
         basis: StructuredBasis::new(field.sensor, CUBIC, None),
         field,
         camera_from_rig: RigidTransform::identity(),

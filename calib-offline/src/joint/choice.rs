@@ -3,8 +3,8 @@
 
 use super::estimate::EstimateError;
 use super::fit::Fit;
+use super::rebase::rebase;
 use crate::adjust::{Model, Observations};
-use crate::field::SmoothMap;
 use crate::field::spline::{Spline, SplineGrid};
 
 /// Spacings tried, in cells along the sensor's longer side, coarse to fine: 112, 56, 40 and 28 px
@@ -24,6 +24,9 @@ const HOPELESS_CHANGES: f64 = 10.0;
 /// Twice the log evidence that a more flexible model must gain: "positive" on the scale of Kass
 /// and Raftery (1995). Ties go to the simpler model.
 const NEEDED_GAIN: f64 = 4.0;
+
+/// How often the base lenses are fitted anew at this stage, at most.
+const MOST_REBASES: usize = 3;
 
 /// An alternative that was tried.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,6 +84,20 @@ pub fn choose(start: Candidate, observations: &Observations) -> (Candidate, Vec<
         observations,
         add_offsets,
     );
+    // Lenses that were fitted as if central hold part of what the offsets explain.
+    for _ in 0..MOST_REBASES {
+        let taken = take_if_better(
+            &mut best,
+            &mut tried,
+            "base lenses fitted anew".to_string(),
+            NEEDED_GAIN,
+            observations,
+            |model| rebase(model, observations),
+        );
+        if !taken {
+            break;
+        }
+    }
     for cells in CELLS {
         let taken = take_if_better(
             &mut best,
@@ -108,7 +125,7 @@ pub fn simplify(best: &mut Candidate, tried: &mut Vec<Choice>, observations: &Ob
                 format!("camera {camera_idx} central"),
                 -NEEDED_GAIN,
                 observations,
-                |model| model.cameras[camera_idx].field.offset = None,
+                |model| model.cameras[camera_idx].drop_offset(),
             );
         }
     }
@@ -163,7 +180,7 @@ fn take_if_better(
 
 fn add_offsets(model: &mut Model) {
     for camera in &mut model.cameras {
-        camera.field.offset = Some(SmoothMap::zero(OFFSET_DEGREE));
+        camera.free_offset(OFFSET_DEGREE);
     }
 }
 

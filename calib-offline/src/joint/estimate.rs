@@ -3,12 +3,13 @@
 use super::choice::{self, Candidate, Choice};
 use super::evidence::{Smoothness, SmoothnessFound};
 use super::fit::Fit;
+use super::rebase::rebase;
 use crate::adjust::levenberg::StopReason;
 use crate::adjust::robust::StudentT;
 use crate::adjust::{CameraModel, Model, Observations};
 use crate::board::BoardShape;
 use crate::field::polynomial::term_count;
-use crate::field::structured::{RadialProfile, StructuredBasis};
+use crate::field::structured::StructuredBasis;
 use crate::init::rig::RigStart;
 use nalgebra::Vector2;
 
@@ -17,6 +18,8 @@ const DEGREE: usize = 7;
 /// Adjustments with structured directions only, of so many steps each.
 const STRUCTURED_ROUNDS: usize = 3;
 const STRUCTURED_STEPS: usize = 3;
+/// How often the base lenses are fitted anew.
+const BASE_ROUNDS: usize = 2;
 /// Steps of the last adjustment, at most; it needs three or four.
 const LAST_STEPS: usize = 30;
 
@@ -76,7 +79,10 @@ pub fn estimate(observations: &Observations, start: &RigStart) -> Result<Estimat
     for _ in 0..STRUCTURED_ROUNDS {
         fit.adjust(&observations, STRUCTURED_STEPS);
     }
-    let mut fit = fit.changed(&observations, free_center_of_distortion);
+    for _ in 0..BASE_ROUNDS {
+        fit = fit.changed(&observations, |model| rebase(model, &observations));
+        fit.adjust(&observations, STRUCTURED_STEPS);
+    }
     fit.smoothness = Smoothness::new(&fit.model);
 
     // What the evidence asks for beyond, first as if corners were independent: only a field that
@@ -109,6 +115,7 @@ fn starting_model(start: &RigStart) -> Model {
             CameraModel {
                 basis: StructuredBasis::new(field.sensor, DEGREE, None),
                 field,
+                offset_basis: None,
                 camera_from_rig: *camera_from_rig,
             }
         })
@@ -117,15 +124,6 @@ fn starting_model(start: &RigStart) -> Model {
         cameras,
         rig_from_board: start.rig_from_board.iter().flatten().copied().collect(),
         board_shape: BoardShape::flat_of_degree_two(),
-    }
-}
-
-/// Lets the center of the radial mapping move freely, now that the mapping is known.
-fn free_center_of_distortion(model: &mut Model) {
-    for camera in &mut model.cameras {
-        let field = &camera.field;
-        let profile = RadialProfile::of(field.sensor, field.base, &field.direction.polynomial);
-        camera.basis = StructuredBasis::new(field.sensor, DEGREE, Some(&profile));
     }
 }
 

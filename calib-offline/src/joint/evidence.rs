@@ -26,8 +26,6 @@ const MOST_GROWTH: f64 = 5.0;
 /// input gives the same bytes. 16 leave 1 to 2 % of noise on a weight, which nothing feels.
 const PROBES: usize = 16;
 const PROBE_SEED: u64 = 0x5eed;
-/// The offset's terms up to this degree share one weight; beyond, each degree has its own.
-pub const OFFSET_CORE_DEGREE: usize = 3;
 
 /// A family of parameters that share one smoothness weight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,7 +34,9 @@ pub enum Family {
     Direction(usize),
     /// The spline deviation of the direction.
     Spline,
-    /// Offset terms of this total degree (of the core degree and below for the core degree).
+    /// Radial offset terms, as of a pupil that moves with the angle.
+    Pupil,
+    /// Other offset terms of this total degree (of the core degree and below for the core degree).
     Offset(usize),
 }
 
@@ -106,7 +106,7 @@ impl Smoothness {
                 let start = match family {
                     Family::Direction(_) => START_DIRECTION,
                     Family::Spline => START_SPLINE,
-                    Family::Offset(_) => START_OFFSET,
+                    Family::Pupil | Family::Offset(_) => START_OFFSET,
                 };
                 let energy_ln_determinant = match (family, camera.knot_order()) {
                     (Family::Spline, Some(order)) => order.thin_plate_ln_determinant(),
@@ -133,7 +133,7 @@ impl Smoothness {
             let priors = &mut cameras[group.camera_idx];
             let target = match group.family {
                 Family::Direction(_) => &mut priors.direction,
-                Family::Offset(_) => &mut priors.offset,
+                Family::Pupil | Family::Offset(_) => &mut priors.offset,
                 Family::Spline => {
                     priors.spline = group.precision;
                     continue;
@@ -171,7 +171,7 @@ impl Smoothness {
                     let start = layout.cameras[group.camera_idx].direction.start;
                     member_sums(&group.members, &amounts, start, &variances)
                 }
-                Family::Offset(_) => {
+                Family::Pupil | Family::Offset(_) => {
                     let amounts = camera.offset_amounts();
                     let start = layout.cameras[group.camera_idx].offset.start;
                     member_sums(&group.members, &amounts, start, &variances)
@@ -266,16 +266,9 @@ fn families(camera: &CameraModel) -> Vec<(Family, Vec<usize>)> {
             put(Family::Direction(*degree), direction);
         }
     }
-    if let Some(offset) = &camera.field.offset {
-        let terms = offset.polynomial.coefficients.len();
-        for component in 0..2 {
-            for (k, (i, j)) in crate::field::polynomial::terms(offset.polynomial.degree).enumerate()
-            {
-                put(
-                    Family::Offset((i + j).max(OFFSET_CORE_DEGREE)),
-                    component * terms + k,
-                );
-            }
+    if let Some((_, basis)) = camera.offset() {
+        for (direction, degree) in basis.penalized_degrees().iter().enumerate() {
+            put(degree.map_or(Family::Pupil, Family::Offset), direction);
         }
     }
     if camera.knot_order().is_some() {

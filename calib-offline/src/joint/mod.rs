@@ -8,6 +8,7 @@ pub mod covariance;
 pub mod estimate;
 pub mod evidence;
 pub mod fit;
+pub mod rebase;
 pub mod recheck;
 
 pub use choice::Choice;

@@ -26,10 +26,7 @@ fn camera(name: &str, field: RayField, rig_from_camera: RigidTransform) -> Calib
 
 /// A perspective lens with radial and tangential distortion of some tens of pixels.
 fn distorted_field(sensor: SensorSize, focal_px: f64) -> RayField {
-    let base = BaseLens {
-        projection: Projection::Perspective,
-        focal_px,
-    };
+    let base = BaseLens::ideal(Projection::Perspective, focal_px);
     let mut field = RayField::ideal(sensor, base, 7);
     let coefficients = &mut field.direction.polynomial.coefficients;
     for (k, c) in coefficients.iter_mut().enumerate() {
@@ -75,10 +72,7 @@ pub fn port_camera() -> CalibratedCamera {
 /// 104 degrees to either side, calibrated inside the image circle only; in the corners outside
 /// the field goes on to where directions can no longer be packed.
 pub fn fisheye_camera() -> CalibratedCamera {
-    let base = BaseLens {
-        projection: Projection::Equidistant,
-        focal_px: 330.0,
-    };
+    let base = BaseLens::ideal(Projection::Equidistant, 330.0);
     let mut field = RayField::ideal(SENSOR, base, 7);
     let last = field.direction.polynomial.coefficients.len() - 1;
     field.direction.polynomial.coefficients[last] = Vector2::new(0.0, 2e-3);

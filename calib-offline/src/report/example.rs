@@ -68,10 +68,7 @@ pub fn calibration() -> Calibration {
             name: (*name).to_owned(),
             field: RayField::ideal(
                 SENSOR,
-                BaseLens {
-                    projection: Projection::Perspective,
-                    focal_px: FOCAL_PX,
-                },
+                BaseLens::ideal(Projection::Perspective, FOCAL_PX),
                 3,
             ),
             coverage: CoverageMask::from_corners(

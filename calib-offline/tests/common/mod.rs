@@ -112,10 +112,7 @@ pub fn rig() -> Rig {
         name: name.to_owned(),
         field: RayField::ideal(
             SENSOR,
-            BaseLens {
-                projection: Projection::Perspective,
-                focal_px: FOCAL_PX,
-            },
+            BaseLens::ideal(Projection::Perspective, FOCAL_PX),
             3,
         ),
         coverage: calibrated_middle(),

@@ -1,0 +1,196 @@
+//! The rotationally symmetric lens that is nearest to a field.
+//!
+//! A field's smoothness weights judge its deviation from the base lens. A lens whose center or
+//! radial mapping is off leaves a deviation of high degree, most of all a wide one, and makes the
+//! weights believe that the lens is rough. So the base is fitted anew once the field is known
+//! roughly; the camera frame turns with it, so that the axis of the lens becomes its z axis.
+
+use super::base_lens::{BaseLens, RADIAL_TERMS};
+use super::transport;
+use crate::geometry::so3;
+use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
+
+/// Focal length, center, radial coefficients, turn.
+const PARAMETERS: usize = 3 + RADIAL_TERMS + 3;
+type Parameters = SVector<f64, PARAMETERS>;
+
+/// Steps of the fit, at most.
+const STEPS: usize = 20;
+/// A step that lowers the objective by a smaller share ends the fit.
+const LEAST_GAIN: f64 = 1e-6;
+/// Standard deviations of the parameters before anything is seen: focal length and center in
+/// shares of the reach, coefficients as what they do to the radius there in shares of it. They
+/// only keep apart what narrow lenses cannot tell apart.
+const PRIOR_SD: [f64; PARAMETERS] = [1.0, 0.1, 0.1, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5];
+/// Weight of those priors beside a residual of 1 px at one pixel.
+const PRIOR_SHARE: f64 = 1e-2;
+
+/// The lens that comes nearest to what was `seen` (offset from the middle of the sensor, px, and
+/// unit direction in the camera frame), and the turn of the camera frame that goes with it
+/// (`new_from_old`). `None` if no step makes it better than `start`.
+///
+/// Cost: 11 evaluations of the lens per direction and step, at most 20 steps.
+pub fn nearest_lens(
+    start: &BaseLens,
+    seen: &[(Vector2<f64>, Vector3<f64>)],
+) -> Option<(BaseLens, Matrix3<f64>)> {
+    let reach_px = seen.iter().map(|(p, _)| p.norm()).fold(0.0, f64::max);
+    if !(reach_px > 0.0) {
+        return None;
+    }
+    let fit = LensFit {
+        start: *start,
+        reach_px,
+        seen,
+    };
+    let mut at = Parameters::zeros();
+    let mut cost = fit.cost(&at)?;
+    let first = cost;
+    let mut damping = 1e-6;
+    for _ in 0..STEPS {
+        let (normal, gradient) = fit.equations(&at)?;
+        let damped = normal + SMatrix::from_diagonal(&(normal.diagonal() * damping));
+        let next = at - damped.cholesky()?.solve(&gradient);
+        match fit.cost(&next) {
+            Some(less) if less < cost => {
+                let gain = (cost - less) / cost;
+                (at, cost) = (next, less);
+                damping *= 0.1;
+                if gain < LEAST_GAIN {
+                    break;
+                }
+            }
+            _ => damping *= 100.0,
+        }
+    }
+    (cost < first).then(|| (fit.lens(&at), fit.turn(&at)))
+}
+
+struct LensFit<'a> {
+    start: BaseLens,
+    /// Distance of the farthest pixel from the middle of the sensor.
+    reach_px: f64,
+    /// Offset from the middle of the sensor, px, and unit direction.
+    seen: &'a [(Vector2<f64>, Vector3<f64>)],
+}
+
+impl LensFit<'_> {
+    fn lens(&self, at: &Parameters) -> BaseLens {
+        let focal_px = self.start.focal_px * at[0].exp();
+        let reach = self.reach_px / focal_px;
+        let mut radial = self.start.radial;
+        for (k, coefficient) in radial.iter_mut().enumerate() {
+            *coefficient += at[3 + k] / reach.powi(2 * k as i32 + 2);
+        }
+        let [u, v] = self.start.center_px;
+        BaseLens {
+            projection: self.start.projection,
+            focal_px,
+            center_px: [u + at[1] * self.reach_px, v + at[2] * self.reach_px],
+            radial,
+            reach,
+        }
+    }
+
+    fn turn(&self, at: &Parameters) -> Matrix3<f64> {
+        so3::exp(&Vector3::new(at[7], at[8], at[9]))
+    }
+
+    /// Differences of angle, in px at the middle of the image.
+    fn residuals(&self, at: &Parameters) -> Option<Vec<Vector2<f64>>> {
+        let (lens, turn) = (self.lens(at), self.turn(at));
+        self.seen
+            .iter()
+            .map(|(offset, direction)| {
+                let s = transport::half_angle(&(turn * direction))?;
+                let (base, _) = lens.evaluate(offset);
+                // The chart stretches angles by 1 + |s|^2 / 4.
+                let scale = self.start.focal_px / (1.0 + s.norm_squared() / 4.0);
+                Some((base - s) * scale)
+            })
+            .collect()
+    }
+
+    fn cost(&self, at: &Parameters) -> Option<f64> {
+        let sum: f64 = self.residuals(at)?.iter().map(|r| r.norm_squared()).sum();
+        let prior: f64 = (0..PARAMETERS)
+            .map(|k| PRIOR_SHARE * (at[k] / PRIOR_SD[k]).powi(2))
+            .sum();
+        (sum + prior).is_finite().then_some(sum + prior)
+    }
+
+    fn equations(
+        &self,
+        at: &Parameters,
+    ) -> Option<(SMatrix<f64, PARAMETERS, PARAMETERS>, Parameters)> {
+        const STEP: f64 = 1e-6;
+        let here = self.residuals(at)?;
+        let columns: Vec<Vec<Vector2<f64>>> = (0..PARAMETERS)
+            .map(|k| {
+                let mut moved = *at;
+                moved[k] += STEP;
+                self.residuals(&moved)
+            })
+            .collect::<Option<_>>()?;
+        let mut normal = SMatrix::zeros();
+        let mut gradient = Parameters::zeros();
+        for (n, residual) in here.iter().enumerate() {
+            let row = |k: usize| (columns[k][n] - residual) / STEP;
+            let rows: [Vector2<f64>; PARAMETERS] = std::array::from_fn(row);
+            for (i, a) in rows.iter().enumerate() {
+                gradient[i] += a.dot(residual);
+                for (j, b) in rows.iter().enumerate() {
+                    normal[(i, j)] += a.dot(b);
+                }
+            }
+        }
+        for (k, sd) in PRIOR_SD.iter().enumerate() {
+            normal[(k, k)] += PRIOR_SHARE / (sd * sd);
+            gradient[k] += PRIOR_SHARE * at[k] / (sd * sd);
+        }
+        Some((normal, gradient))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::Projection;
+    use crate::geometry::SensorSize;
+
+    #[test]
+    fn a_wide_lens_off_center_is_found_with_its_turn() {
+        let truth = BaseLens {
+            center_px: [9.0, -6.0],
+            radial: [-0.05, 0.01, 0.0, 0.0],
+            reach: 2.0,
+            ..BaseLens::ideal(Projection::Equidistant, 210.0)
+        };
+        let turn = so3::exp(&Vector3::new(0.02, -0.01, 0.005));
+        let seen: Vec<_> = (-15..15)
+            .flat_map(|j| (-20..20).map(move |i| (f64::from(i), f64::from(j))))
+            .map(|(i, j)| {
+                let offset = Vector2::new(16.0 * i, 16.0 * j);
+                let direction = transport::direction(&truth.evaluate(&offset).0);
+                (offset, turn.tr_mul(&direction.normalize()))
+            })
+            .collect();
+        let start = BaseLens::ideal(Projection::Equidistant, 200.0);
+        let (lens, found) = nearest_lens(&start, &seen).unwrap();
+        // The priors pull by far less than a thousandth of a pixel.
+        for (offset, direction) in &seen {
+            let s = transport::half_angle(&(found * direction)).unwrap();
+            assert!((lens.evaluate(offset).0 - s).norm() * 210.0 < 1e-3);
+        }
+        assert!((found - turn).norm() < 1e-4, "{found}");
+        assert!((Vector2::from(lens.center_px) - Vector2::new(9.0, -6.0)).norm() < 0.02);
+    }
+
+    #[test]
+    fn without_a_better_lens_there_is_none() {
+        let start = BaseLens::ideal(Projection::Perspective, 200.0);
+        let axis = (Vector2::zeros(), Vector3::z());
+        assert_eq!(nearest_lens(&start, &[axis]), None);
+        assert_eq!(nearest_lens(&start, &[]), None);
+    }
+}

@@ -1,0 +1,71 @@
+//! Base lenses fitted anew to what the fields have found, and the frames turned with them.
+
+use crate::adjust::{Model, Observations};
+use crate::field::SmoothMap;
+use crate::field::lens_fit::nearest_lens;
+use crate::field::structured::StructuredBasis;
+use crate::field::transport;
+use crate::geometry::RigidTransform;
+use nalgebra::{Matrix3, Vector2, Vector3};
+
+/// Corners of a camera that a lens is fitted to, about.
+const CORNERS: usize = 1000;
+
+/// Puts the nearest lens under each central field without spline, and frees its shift. What the
+/// polynomial held beyond it is dropped: the next adjustment finds it again.
+pub fn rebase(model: &mut Model, observations: &Observations) {
+    for camera_idx in 0..model.cameras.len() {
+        let seen = seen_directions(model, observations, camera_idx);
+        let field = &mut model.cameras[camera_idx].field;
+        if let Some((lens, turn)) = nearest_lens(&field.base, &seen) {
+            field.base = lens;
+            field.direction = SmoothMap::zero(field.direction.polynomial.degree);
+            turn_camera(model, camera_idx, &turn);
+        }
+        let camera = &mut model.cameras[camera_idx];
+        let degree = camera.field.direction.polynomial.degree;
+        camera.basis = StructuredBasis::new(camera.field.sensor, degree, Some(&camera.field.base));
+    }
+}
+
+/// Offset from the middle of the sensor, px, and direction, at corners from all views.
+fn seen_directions(
+    model: &Model,
+    observations: &Observations,
+    camera_idx: usize,
+) -> Vec<(Vector2<f64>, Vector3<f64>)> {
+    let field = &model.cameras[camera_idx].field;
+    let center = field.sensor.center();
+    let own = observations
+        .views
+        .iter()
+        .filter(|view| view.camera_idx == camera_idx);
+    let count: usize = own.clone().map(|view| view.corners.len()).sum();
+    own.flat_map(|view| &view.corners)
+        .step_by((count / CORNERS).max(1))
+        .map(|corner| {
+            let pixel = corner.pixel;
+            let direction = transport::direction(&field.sample(pixel).s);
+            (
+                Vector2::new(pixel.u - center.u, pixel.v - center.v),
+                direction.normalize(),
+            )
+        })
+        .collect()
+}
+
+/// Turns a camera's frame and, as the rig's frame is that of camera 0, everything else with that.
+fn turn_camera(model: &mut Model, camera_idx: usize, new_from_old: &Matrix3<f64>) {
+    let turn = RigidTransform::new(*new_from_old, Vector3::zeros());
+    if camera_idx > 0 {
+        let camera_from_rig = &mut model.cameras[camera_idx].camera_from_rig;
+        *camera_from_rig = turn * *camera_from_rig;
+        return;
+    }
+    for pose in &mut model.rig_from_board {
+        *pose = turn * *pose;
+    }
+    for camera in &mut model.cameras[1..] {
+        camera.camera_from_rig = camera.camera_from_rig * turn.inverse();
+    }
+}
