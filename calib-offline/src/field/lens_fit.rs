@@ -18,23 +18,29 @@ type Parameters = SVector<f64, PARAMETERS>;
 const STEPS: usize = 20;
 /// A step that lowers the objective by a smaller share ends the fit.
 const LEAST_GAIN: f64 = 1e-6;
-/// Standard deviations of the parameters before anything is seen: focal length and center in
-/// shares of the reach, coefficients as what they do to the radius there in shares of it. They
-/// only keep apart what narrow lenses cannot tell apart.
-const PRIOR_SD: [f64; PARAMETERS] = [1.0, 0.1, 0.1, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5];
-/// Weight of those priors beside a residual of 1 px at one pixel.
-const PRIOR_SHARE: f64 = 1e-2;
+/// Standard deviations of the parameters' changes before anything is seen: logarithm of the focal
+/// length, center in shares of the reach, coefficients as what they do to the radius there in
+/// shares of it, turn in rad. They keep apart what narrow lenses cannot tell apart, and the high
+/// coefficients from following, with large values that cancel, what is not of the lens.
+const PRIOR_SD: [f64; PARAMETERS] = [1.0, 0.1, 0.1, 0.3, 0.3, 0.01, 0.01, 0.5, 0.5, 0.5];
+/// How much farther the mapping holds than to the farthest corner.
+const REACH_MARGIN: f64 = 1.1;
+/// A change by that much costs as much as a residual of so many px at one pixel.
+const PRIOR_SHARE: f64 = 1.0;
 
 /// The lens that comes nearest to what was `seen` (offset from the middle of the sensor, px, and
 /// unit direction in the camera frame), and the turn of the camera frame that goes with it
 /// (`new_from_old`). `None` if no step makes it better than `start`.
 ///
+/// `reach_px` is how far from the middle of the sensor the lens must hold; there its mapping has a
+/// kink in the second derivative, which no corner may lie beyond.
+///
 /// Cost: 11 evaluations of the lens per direction and step, at most 20 steps.
 pub fn nearest_lens(
     start: &BaseLens,
     seen: &[(Vector2<f64>, Vector3<f64>)],
+    reach_px: f64,
 ) -> Option<(BaseLens, Matrix3<f64>)> {
-    let reach_px = seen.iter().map(|(p, _)| p.norm()).fold(0.0, f64::max);
     if !(reach_px > 0.0) {
         return None;
     }
@@ -77,7 +83,8 @@ struct LensFit<'a> {
 impl LensFit<'_> {
     fn lens(&self, at: &Parameters) -> BaseLens {
         let focal_px = self.start.focal_px * at[0].exp();
-        let reach = self.reach_px / focal_px;
+        // The center may move by so much.
+        let reach = REACH_MARGIN * self.reach_px / focal_px;
         let mut radial = self.start.radial;
         for (k, coefficient) in radial.iter_mut().enumerate() {
             *coefficient += at[3 + k] / reach.powi(2 * k as i32 + 2);
@@ -176,7 +183,7 @@ mod tests {
             })
             .collect();
         let start = BaseLens::ideal(Projection::Equidistant, 200.0);
-        let (lens, found) = nearest_lens(&start, &seen).unwrap();
+        let (lens, found) = nearest_lens(&start, &seen, 420.0).unwrap();
         // The priors pull by far less than a thousandth of a pixel.
         for (offset, direction) in &seen {
             let s = transport::half_angle(&(found * direction)).unwrap();
@@ -190,7 +197,7 @@ mod tests {
     fn without_a_better_lens_there_is_none() {
         let start = BaseLens::ideal(Projection::Perspective, 200.0);
         let axis = (Vector2::zeros(), Vector3::z());
-        assert_eq!(nearest_lens(&start, &[axis]), None);
-        assert_eq!(nearest_lens(&start, &[]), None);
+        assert_eq!(nearest_lens(&start, &[axis], 300.0), None);
+        assert_eq!(nearest_lens(&start, &[], 300.0), None);
     }
 }

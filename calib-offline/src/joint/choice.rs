@@ -76,7 +76,7 @@ impl Candidate {
 pub fn choose(start: Candidate, observations: &Observations) -> (Candidate, Vec<Choice>) {
     let mut best = start;
     let mut tried = Vec::new();
-    take_if_better(
+    let offsets_taken = take_if_better(
         &mut best,
         &mut tried,
         "offsets of all cameras".to_string(),
@@ -85,7 +85,7 @@ pub fn choose(start: Candidate, observations: &Observations) -> (Candidate, Vec<
         add_offsets,
     );
     // Lenses that were fitted as if central hold part of what the offsets explain.
-    for _ in 0..MOST_REBASES {
+    for _ in 0..if offsets_taken { MOST_REBASES } else { 0 } {
         let taken = take_if_better(
             &mut best,
             &mut tried,

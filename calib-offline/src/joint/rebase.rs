@@ -5,7 +5,7 @@ use crate::field::SmoothMap;
 use crate::field::lens_fit::nearest_lens;
 use crate::field::structured::StructuredBasis;
 use crate::field::transport;
-use crate::geometry::RigidTransform;
+use crate::geometry::{PixelPoint, RigidTransform};
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// Corners of a camera that a lens is fitted to, about.
@@ -15,9 +15,9 @@ const CORNERS: usize = 1000;
 /// polynomial held beyond it is dropped: the next adjustment finds it again.
 pub fn rebase(model: &mut Model, observations: &Observations) {
     for camera_idx in 0..model.cameras.len() {
-        let seen = seen_directions(model, observations, camera_idx);
+        let (seen, reach_px) = seen_directions(model, observations, camera_idx);
         let field = &mut model.cameras[camera_idx].field;
-        if let Some((lens, turn)) = nearest_lens(&field.base, &seen) {
+        if let Some((lens, turn)) = nearest_lens(&field.base, &seen, reach_px) {
             field.base = lens;
             field.direction = SmoothMap::zero(field.direction.polynomial.degree);
             turn_camera(model, camera_idx, &turn);
@@ -28,30 +28,37 @@ pub fn rebase(model: &mut Model, observations: &Observations) {
     }
 }
 
-/// Offset from the middle of the sensor, px, and direction, at corners from all views.
+/// Offset from the middle of the sensor, px, and direction, at some corners of all views; and the
+/// largest offset of any corner, px.
 fn seen_directions(
     model: &Model,
     observations: &Observations,
     camera_idx: usize,
-) -> Vec<(Vector2<f64>, Vector3<f64>)> {
+) -> (Vec<(Vector2<f64>, Vector3<f64>)>, f64) {
     let field = &model.cameras[camera_idx].field;
     let center = field.sensor.center();
-    let own = observations
+    let pixels: Vec<PixelPoint> = observations
         .views
         .iter()
-        .filter(|view| view.camera_idx == camera_idx);
-    let count: usize = own.clone().map(|view| view.corners.len()).sum();
-    own.flat_map(|view| &view.corners)
-        .step_by((count / CORNERS).max(1))
-        .map(|corner| {
-            let pixel = corner.pixel;
-            let direction = transport::direction(&field.sample(pixel).s);
+        .filter(|view| view.camera_idx == camera_idx)
+        .flat_map(|view| view.corners.iter().map(|corner| corner.pixel))
+        .collect();
+    let reach_px = pixels
+        .iter()
+        .map(|pixel| pixel.distance_px(center))
+        .fold(0.0, f64::max);
+    let seen = pixels
+        .iter()
+        .step_by((pixels.len() / CORNERS).max(1))
+        .map(|pixel| {
+            let direction = transport::direction(&field.sample(*pixel).s);
             (
                 Vector2::new(pixel.u - center.u, pixel.v - center.v),
                 direction.normalize(),
             )
         })
-        .collect()
+        .collect();
+    (seen, reach_px)
 }
 
 /// Turns a camera's frame and, as the rig's frame is that of camera 0, everything else with that.
