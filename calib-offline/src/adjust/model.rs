@@ -125,6 +125,13 @@ pub struct Step {
 }
 
 impl Model {
+    /// Whether any camera's direction has a spline.
+    pub fn has_spline(&self) -> bool {
+        self.cameras
+            .iter()
+            .any(|c| c.field.direction.spline.is_some())
+    }
+
     /// Where each parameter stands.
     pub fn layout(&self) -> Layout {
         let mut next = 0;

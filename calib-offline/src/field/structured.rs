@@ -86,9 +86,9 @@ impl StructuredBasis {
         builder.finish(degree, GAUGE_DIRECTIONS)
     }
 
-    /// The basis of an offset field, mm, over a sensor: first the radial terms `r^2k (x, y)`, k =
-    /// 1..3, about the center of the lens, by which a pupil moves with the angle (tagged `None`),
-    /// then everything else by degree, up to [`OFFSET_CORE_DEGREE`] as one. Nothing is cut off.
+    /// The basis of an offset field, mm, over a sensor: everything up to [`OFFSET_CORE_DEGREE`] as
+    /// one; the radial terms `r^2k (x, y)` beyond it, k = 2 and 3, about the center of the lens, by
+    /// which a pupil moves with the angle (tagged `None`); the rest by degree. Nothing is cut off.
     pub fn offset(sensor: SensorSize, degree: usize, lens: &BaseLens) -> Self {
         let lattice = Lattice::new(sensor, degree);
         let mut builder = Builder {
@@ -96,8 +96,11 @@ impl StructuredBasis {
             orthonormal: Vec::new(),
             penalized_degree: Vec::new(),
         };
+        builder.add_degrees(0..=OFFSET_CORE_DEGREE.min(degree), degree, |_| {
+            OFFSET_CORE_DEGREE
+        });
         builder.add_radial(degree, &center_in_half_widths(sensor, lens));
-        builder.add_degrees(0..=degree, degree, |total| total.max(OFFSET_CORE_DEGREE));
+        builder.add_degrees(OFFSET_CORE_DEGREE + 1..=degree, degree, |total| total);
         builder.finish(degree, 0)
     }
 

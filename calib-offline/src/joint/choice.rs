@@ -7,13 +7,14 @@ use super::rebase::rebase;
 use crate::adjust::{Model, Observations};
 use crate::field::spline::{Spline, SplineGrid};
 
-/// Spacings tried, in cells along the sensor's longer side, coarse to fine: 112, 56, 40 and 28 px
-/// on 1280 px. The search stops when the evidence falls.
-const CELLS: [f64; 4] = [11.5, 23.0, 32.0, 46.0];
+/// Spacing of a first spline, in cells along the sensor's longer side: 56 px on 1280 px.
+const FIRST_CELLS: f64 = 23.0;
+/// Finer ones, coarse to fine: 40 and 28 px on 1280 px. The search stops when the evidence falls.
+const FINER_CELLS: [f64; 2] = [32.0, 46.0];
 /// Degree of the offset's polynomial: a cubic follows windows and flat ports, the higher degrees,
 /// held back by weights of their own, curved ports and mirrors.
 const OFFSET_DEGREE: usize = 7;
-/// Rounds after a change of the model, at most.
+/// Rounds after a change of the model, at most; twice as many if it is the best so far.
 const ROUNDS: usize = 8;
 /// A round that changes twice the log evidence by less settles the fit.
 const SETTLED: f64 = 0.5;
@@ -41,6 +42,7 @@ pub struct Choice {
 }
 
 /// The fit with its evidence.
+#[derive(Clone)]
 pub struct Candidate {
     /// The fit.
     pub fit: Fit,
@@ -60,11 +62,14 @@ impl Candidate {
         observations: &Observations,
     ) -> Result<Self, EstimateError> {
         let mut evidence = f64::NEG_INFINITY;
-        for _ in 0..ROUNDS {
+        for round in 0..2 * ROUNDS {
             let now = fit.round(observations)?;
             let change = (now - evidence).abs();
             evidence = now;
-            if change < SETTLED || rival - now > HOPELESS_GAP + HOPELESS_CHANGES * change {
+            let hopeless = rival - now > HOPELESS_GAP + HOPELESS_CHANGES * change;
+            // Only what wins is worth more rounds; unsettled, it would lose to itself.
+            let decided = round + 1 >= ROUNDS && now - rival < NEEDED_GAIN;
+            if change < SETTLED || hopeless || decided {
                 break;
             }
         }
@@ -74,108 +79,158 @@ impl Candidate {
 
 /// Takes what the evidence asks for, starting from a settled fit without spline and offset.
 pub fn choose(start: Candidate, observations: &Observations) -> (Candidate, Vec<Choice>) {
-    let mut best = start;
-    let mut tried = Vec::new();
-    let offsets_taken = take_if_better(
-        &mut best,
-        &mut tried,
-        "offsets of all cameras".to_string(),
-        NEEDED_GAIN,
+    let mut search = Search {
+        best: start,
+        tried: Vec::new(),
         observations,
-        add_offsets,
-    );
-    // Lenses that were fitted as if central hold part of what the offsets explain.
-    for _ in 0..if offsets_taken { MOST_REBASES } else { 0 } {
-        let taken = take_if_better(
-            &mut best,
-            &mut tried,
-            "base lenses fitted anew".to_string(),
-            NEEDED_GAIN,
-            observations,
-            |model| rebase(model, observations),
-        );
-        if !taken {
+    };
+    search.structure();
+    for cells in FINER_CELLS {
+        if search.best.fit.model.has_spline() && !search.spline(cells) {
             break;
         }
     }
-    for cells in CELLS {
-        let taken = take_if_better(
-            &mut best,
-            &mut tried,
+    search.simplify();
+    (search.best, search.tried)
+}
+
+/// Drops what the evidence no longer asks for; what was tried is added to `tried`.
+pub fn simplify(
+    best: Candidate,
+    tried: &mut Vec<Choice>,
+    observations: &Observations,
+) -> Candidate {
+    let mut search = Search {
+        best,
+        tried: std::mem::take(tried),
+        observations,
+    };
+    search.simplify();
+    *tried = search.tried;
+    search.best
+}
+
+/// The best model so far and the way to it.
+struct Search<'a> {
+    best: Candidate,
+    tried: Vec<Choice>,
+    observations: &'a Observations,
+}
+
+impl Search<'_> {
+    /// A spline, offsets, or both. A lens that needs one of them badly lets the other explain part
+    /// of what it does, so whichever explains more goes first.
+    fn structure(&mut self) {
+        let bare = self.best.clone();
+        let spline_taken = self.spline(FIRST_CELLS);
+        if !spline_taken {
+            if self.offsets() {
+                self.lenses();
+                self.spline(FIRST_CELLS);
+            }
+            return;
+        }
+        // The offsets without the spline against the spline without them.
+        let splined = std::mem::replace(&mut self.best, bare);
+        let changed = self.best.fit.changed(self.observations, add_offsets);
+        let rival = splined.evidence;
+        let offsets = Candidate::settle(changed, rival, self.observations).ok();
+        match offsets {
+            Some(offsets) if offsets.evidence > rival => {
+                self.tried.push(Choice {
+                    what: "offsets of all cameras in place of the spline".to_string(),
+                    gain: offsets.evidence - rival,
+                    taken: true,
+                });
+                self.best = offsets;
+                self.lenses();
+                self.spline(FIRST_CELLS);
+            }
+            _ => {
+                self.best = splined;
+                if self.offsets() {
+                    self.drop_spline();
+                }
+            }
+        }
+    }
+
+    fn spline(&mut self, cells: f64) -> bool {
+        self.take_if_better(
             format!("spline of {cells:.0} cells along the longer side"),
             NEEDED_GAIN,
-            observations,
             |model| set_spline(model, cells),
-        );
-        if !taken {
-            break;
+        )
+    }
+
+    fn offsets(&mut self) -> bool {
+        self.take_if_better(
+            "offsets of all cameras".to_string(),
+            NEEDED_GAIN,
+            add_offsets,
+        )
+    }
+
+    /// Base lenses that were fitted as if central hold part of what offsets explain.
+    fn lenses(&mut self) {
+        let observations = self.observations;
+        for _ in 0..MOST_REBASES {
+            let what = "base lenses fitted anew".to_string();
+            if !self.take_if_better(what, NEEDED_GAIN, |model| rebase(model, observations)) {
+                break;
+            }
         }
     }
-    simplify(&mut best, &mut tried, observations);
-    (best, tried)
-}
 
-/// Drops what the evidence no longer asks for: offsets camera by camera, then splines.
-pub fn simplify(best: &mut Candidate, tried: &mut Vec<Choice>, observations: &Observations) {
-    for camera_idx in 0..best.fit.model.cameras.len() {
-        if best.fit.model.cameras[camera_idx].field.offset.is_some() {
-            take_if_better(
-                best,
-                tried,
-                format!("camera {camera_idx} central"),
-                -NEEDED_GAIN,
-                observations,
-                |model| model.cameras[camera_idx].drop_offset(),
-            );
+    fn drop_spline(&mut self) -> bool {
+        self.take_if_better("no spline".to_string(), -NEEDED_GAIN, |model| {
+            for camera in &mut model.cameras {
+                camera.field.direction.spline = None;
+            }
+        })
+    }
+
+    /// Drops what the evidence no longer asks for: offsets camera by camera, then splines.
+    fn simplify(&mut self) {
+        let mut changed = false;
+        for camera_idx in 0..self.best.fit.model.cameras.len() {
+            if self.best.fit.model.cameras[camera_idx].offset().is_some() {
+                let what = format!("camera {camera_idx} central");
+                changed |= self.take_if_better(what, -NEEDED_GAIN, |model| {
+                    model.cameras[camera_idx].drop_offset();
+                });
+            }
+        }
+        if self.best.fit.model.has_spline() && changed {
+            self.drop_spline();
         }
     }
-    if best
-        .fit
-        .model
-        .cameras
-        .iter()
-        .any(|c| c.knot_order().is_some())
-    {
-        take_if_better(
-            best,
-            tried,
-            "no spline".to_string(),
-            -NEEDED_GAIN,
-            observations,
-            |model| {
-                for camera in &mut model.cameras {
-                    camera.field.direction.spline = None;
-                }
-            },
-        );
-    }
-}
 
-fn take_if_better(
-    best: &mut Candidate,
-    tried: &mut Vec<Choice>,
-    what: String,
-    needed: f64,
-    observations: &Observations,
-    change: impl FnOnce(&mut Model),
-) -> bool {
-    // A model that the data leave open has no evidence for it; the one so far stands.
-    let changed = best.fit.changed(observations, change);
-    let Ok(candidate) = Candidate::settle(changed, best.evidence, observations) else {
-        tried.push(Choice {
-            what,
-            gain: f64::NEG_INFINITY,
-            taken: false,
-        });
-        return false;
-    };
-    let gain = candidate.evidence - best.evidence;
-    let taken = gain > needed;
-    tried.push(Choice { what, gain, taken });
-    if taken {
-        *best = candidate;
+    fn take_if_better(
+        &mut self,
+        what: String,
+        needed: f64,
+        change: impl FnOnce(&mut Model),
+    ) -> bool {
+        // A model that the data leave open has no evidence for it; the one so far stands.
+        let changed = self.best.fit.changed(self.observations, change);
+        let Ok(candidate) = Candidate::settle(changed, self.best.evidence, self.observations)
+        else {
+            self.tried.push(Choice {
+                what,
+                gain: f64::NEG_INFINITY,
+                taken: false,
+            });
+            return false;
+        };
+        let gain = candidate.evidence - self.best.evidence;
+        let taken = gain > needed;
+        self.tried.push(Choice { what, gain, taken });
+        if taken {
+            self.best = candidate;
+        }
+        taken
     }
-    taken
 }
 
 fn add_offsets(model: &mut Model) {

@@ -92,7 +92,7 @@ pub fn estimate(observations: &Observations, start: &RigStart) -> Result<Estimat
     let correlation = best.fit.measure_correlation(&observations);
     if best.fit.share < 1.0 {
         best = Candidate::settle(best.fit, f64::NEG_INFINITY, &observations)?;
-        choice::simplify(&mut best, &mut choices, &observations);
+        best = choice::simplify(best, &mut choices, &observations);
     }
     let mut fit = best.fit;
     fit.adjust(&observations, LAST_STEPS);
