@@ -9,6 +9,7 @@
 use super::banded::BandedMatrix;
 use super::knots::KnotOrder;
 use super::model::{CameraModel, Model};
+use super::moments::FieldMoments;
 use super::observations::{Observations, ViewBasis, ViewBlock};
 use super::residual::{Linearization, linearize};
 use crate::field::spline::AxisWeights;
@@ -102,8 +103,8 @@ impl Components {
 
 /// What one view contributes.
 pub struct ViewSums {
-    /// Field by field, lower triangle: columns by component, see [`Components`].
-    pub field: DMatrix<f64>,
+    /// Field by field, as sums that give the block of the camera.
+    pub field: FieldMoments,
     /// Field by the small columns: pose 6, extrinsics 6, board, gradient.
     pub field_small: DMatrix<f64>,
     /// The small columns by themselves.
@@ -115,7 +116,7 @@ pub struct ViewSums {
 }
 
 /// Number of the pair (a, b), a <= b, of `count` components.
-fn pair(count: usize, a: usize, b: usize) -> usize {
+pub(super) fn pair(count: usize, a: usize, b: usize) -> usize {
     let (a, b) = (a.min(b), a.max(b));
     a * count - a * (a + 1) / 2 + b
 }
@@ -137,6 +138,7 @@ pub fn view_sums(
     let mut crossed = vec![DMatrix::zeros(small_len, n); count];
     let mut small = DMatrix::zeros(small_len, small_len);
     let mut row = vec![Vector2::zeros(); small_len];
+    let mut field = FieldMoments::zero(basis.degree(), count);
     for (idx, seen) in predict(model, observations, view, basis).enumerate() {
         let weight = weights[idx];
         let Some(l) = seen.linearization.as_ref().filter(|_| weight > 0.0) else {
@@ -153,6 +155,9 @@ pub fn view_sums(
             for b in a..count {
                 pairs[(pair(count, a, b), idx)] = weight * j[a].dot(&j[b]);
             }
+        }
+        field.add(basis.axes(idx), column(&pairs, idx));
+        for a in 0..count {
             let weighted = j[a] * weight;
             let target = &mut crossed[a].as_mut_slice()[idx * small_len..][..small_len];
             for (entry, value) in target.iter_mut().zip(&row) {
@@ -168,10 +173,7 @@ pub fn view_sums(
         }
     }
     small.fill_lower_triangle_with_upper_triangle();
-    let mut field = DMatrix::zeros(components.len(), components.len());
     let mut field_small = DMatrix::zeros(components.len(), small_len);
-    let term_count = basis.products().nrows();
-    let mut scaled = DMatrix::zeros(term_count, n);
     for (a, crossed) in crossed.iter().enumerate() {
         let (start, terms) = (components.start(a), components.terms(a));
         let products = basis.products().rows(0, terms);
@@ -181,23 +183,6 @@ pub fn view_sums(
             &transposed(crossed, small_len),
             0.0,
         );
-        for b in 0..=a {
-            let other_terms = components.terms(b);
-            let weights = pairs.row(pair(count, b, a));
-            for ((target, source), weight) in scaled
-                .as_mut_slice()
-                .chunks_exact_mut(term_count)
-                .zip(basis.products().as_slice().chunks_exact(term_count))
-                .zip(weights.iter())
-            {
-                for (entry, product) in target.iter_mut().zip(source) {
-                    *entry = weight * product;
-                }
-            }
-            field
-                .view_mut((start, components.start(b)), (terms, other_terms))
-                .gemm(1.0, &products, &transposed(&scaled, other_terms), 0.0);
-        }
     }
     ViewSums {
         field,

@@ -9,6 +9,7 @@ pub mod covariance;
 pub mod knots;
 pub mod levenberg;
 pub mod model;
+mod moments;
 pub mod normal_equations;
 pub mod observations;
 mod product;

@@ -16,6 +16,7 @@ use super::spline_block::{BorderColumns, EliminatedSpline, SplineBlock};
 use crate::field::structured::StructuredBasis;
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, Vector2, Vector6};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Inverse variances of the parameters that smoothness or plausibility holds back.
 #[derive(Debug, Clone)]
@@ -36,17 +37,25 @@ pub struct CameraPriors {
     /// Weight of the spline's thin-plate energy, 1/rad^2.
     pub spline: f64,
     /// That energy; `None` without a spline.
-    pub thin_plate: Option<BandedMatrix>,
+    pub thin_plate: Option<Arc<BandedMatrix>>,
 }
 
 impl CameraPriors {
     /// No prior on the polynomials, nothing for the spline yet.
     pub fn free(camera: &CameraModel) -> Self {
+        let thin_plate = camera
+            .knot_order()
+            .map(|order| Arc::new(order.thin_plate()));
+        Self::with_energy(camera, thin_plate)
+    }
+
+    /// The same, given the energy of the camera's spline.
+    pub fn with_energy(camera: &CameraModel, thin_plate: Option<Arc<BandedMatrix>>) -> Self {
         Self {
             direction: DVector::zeros(camera.basis.len()),
             offset: DVector::zeros(camera.offset_amounts().len()),
             spline: 0.0,
-            thin_plate: camera.knot_order().map(|order| order.thin_plate()),
+            thin_plate,
         }
     }
 
@@ -191,7 +200,15 @@ impl NormalEquations {
         let to_columns: Vec<DMatrix<f64>> =
             model.cameras.iter().map(parameters_to_columns).collect();
         for camera_idx in 0..model.cameras.len() {
-            equations.add_field_block(layout, observations, &sums, &to_columns, camera_idx);
+            let components = Components::of(&model.cameras[camera_idx]);
+            equations.add_field_block(
+                layout,
+                observations,
+                &sums,
+                &to_columns,
+                camera_idx,
+                &components,
+            );
         }
         for (view, sums) in observations.views.iter().zip(&sums) {
             equations.add_view(layout, view, sums, &to_columns[view.camera_idx]);
@@ -227,14 +244,21 @@ impl NormalEquations {
         sums: &[ViewSums],
         to_columns: &[DMatrix<f64>],
         camera_idx: usize,
+        components: &Components,
     ) {
         let to_columns = &to_columns[camera_idx];
-        let mut block = DMatrix::zeros(to_columns.nrows(), to_columns.nrows());
-        for (view, sums) in observations.views.iter().zip(sums) {
-            if view.camera_idx == camera_idx {
-                block += &sums.field;
-            }
-        }
+        let mut own = observations
+            .views
+            .iter()
+            .zip(sums)
+            .filter(|(view, _)| view.camera_idx == camera_idx)
+            .map(|(_, sums)| &sums.field);
+        let Some(first) = own.next() else {
+            return;
+        };
+        let mut moments = first.clone();
+        own.for_each(|other| moments.merge(other));
+        let mut block = moments.block(components);
         block.fill_upper_triangle_with_lower_triangle();
         let carried = to_columns.transpose() * (block * to_columns);
         let start = layout.cameras[camera_idx].direction.start;
@@ -542,12 +566,12 @@ impl Reduced {
     }
 
     /// `tr(matrix covariance)` over the knots of one camera's spline, by Hutchinson's estimator
-    /// with the given probes (entries +1 and -1). 0 without a spline.
+    /// with the given probes (entries +1 and -1) and `matrix` times each. 0 without a spline.
     pub fn spline_trace(
         &self,
         camera_idx: usize,
-        matrix: &BandedMatrix,
         probes: &[DVector<f64>],
+        weighted: &[DVector<f64>],
     ) -> f64 {
         let Eliminated::Splines(splines) = &self.eliminated else {
             return 0.0;
@@ -556,18 +580,17 @@ impl Reduced {
             return 0.0;
         };
         let count = probes.len();
-        let mut columns = vec![0.0; matrix.size() * count];
+        let mut columns = vec![0.0; probes.iter().map(DVector::len).sum()];
         for (k, probe) in probes.iter().enumerate() {
             for (row, value) in probe.iter().enumerate() {
                 columns[row * count + k] = *value;
             }
         }
         let solved = spline.covariance_times(&columns, count, &self.border, self.right.len());
-        let sum: f64 = probes
+        let sum: f64 = weighted
             .iter()
             .enumerate()
-            .map(|(k, probe)| {
-                let weighted = matrix.times(probe);
+            .map(|(k, weighted)| {
                 let solved = solved.iter().skip(k).step_by(count);
                 weighted.iter().zip(solved).map(|(a, b)| a * b).sum::<f64>()
             })

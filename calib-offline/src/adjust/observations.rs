@@ -3,7 +3,7 @@
 
 use crate::board::BoardSpec;
 use crate::dataset::View;
-use crate::field::polynomial::{self, Polynomial};
+use crate::field::polynomial::{self, AxisValues, Polynomial};
 use crate::field::spline::AxisWeights;
 use crate::field::{BaseLens, FieldSample, RayField};
 use crate::geometry::{PixelPoint, SensorSize};
@@ -172,6 +172,8 @@ struct PolynomialBasis {
     products_du: DMatrix<f64>,
     /// Their derivatives by v, 1/px.
     products_dv: DMatrix<f64>,
+    /// The single polynomials up to twice the degree, for products of products.
+    axes: Vec<AxisValues>,
 }
 
 impl ViewBasis {
@@ -199,6 +201,16 @@ impl ViewBasis {
     /// Legendre products, one column per corner; those of lower degree come first.
     pub fn products(&self) -> &DMatrix<f64> {
         &self.polynomial.products
+    }
+
+    /// Highest degree of the products.
+    pub fn degree(&self) -> usize {
+        self.polynomial.degree
+    }
+
+    /// The single polynomials at a corner, up to twice [`Self::degree`].
+    pub fn axes(&self, corner_idx: usize) -> &AxisValues {
+        &self.polynomial.axes[corner_idx]
     }
 
     /// The field's numbers at a corner.
@@ -262,12 +274,18 @@ impl PolynomialBasis {
             products: DMatrix::zeros(k, n),
             products_du: DMatrix::zeros(k, n),
             products_dv: DMatrix::zeros(k, n),
+            axes: Vec::with_capacity(n),
         };
         let center = field.sensor.center();
         let mut values = Vec::with_capacity(k);
         for (c, corner) in view.corners.iter().enumerate() {
             let offset = Vector2::new(corner.pixel.u - center.u, corner.pixel.v - center.v);
             basis.base.push(field.base.evaluate(&offset));
+            basis.axes.push(polynomial::axis_values(
+                field.sensor,
+                2 * degree,
+                corner.pixel,
+            ));
             polynomial::basis(field.sensor, degree, corner.pixel, &mut values);
             for (r, [value, du, dv]) in values.iter().enumerate() {
                 basis.products[(r, c)] = *value;

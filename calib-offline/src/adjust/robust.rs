@@ -52,17 +52,27 @@ impl StudentT {
 
     /// The distribution, of those tried, that makes the residuals most likely. `squared_px2` are
     /// the squared lengths of residual vectors; at least `floor_px2` per axis is assumed, so that
-    /// noise-free data have a scale.
-    pub fn fit(squared_px2: &[f64], floor_px2: f64) -> Self {
+    /// noise-free data have a scale. Of a fit to much the same residuals, `known`, only the
+    /// neighbors are tried.
+    pub fn fit(squared_px2: &[f64], floor_px2: f64, known: Option<&Self>) -> Self {
         let mut best: Option<(f64, Self)> = None;
         let robust_start = {
-            let mut sorted = squared_px2.to_vec();
-            sorted.sort_by(f64::total_cmp);
+            let mut values = squared_px2.to_vec();
+            let middle = values.len() / 2;
+            let median = (middle < values.len())
+                .then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1);
             // The median of |r|^2 of a bivariate Gaussian is 2 ln 2 times its variance per axis.
-            sorted.get(sorted.len() / 2).copied().unwrap_or(0.0) / (2.0 * 2f64.ln())
+            median.unwrap_or(0.0) / (2.0 * 2f64.ln())
         }
         .max(floor_px2);
-        for freedom in CANDIDATES {
+        let near = |freedom: f64| {
+            let place = |wanted: f64| CANDIDATES.iter().position(|c| *c >= wanted);
+            known.is_none_or(|known| match (place(known.freedom), place(freedom)) {
+                (Some(a), Some(b)) => a.abs_diff(b) <= 1,
+                _ => true,
+            })
+        };
+        for freedom in CANDIDATES.into_iter().filter(|freedom| near(*freedom)) {
             let mut fit = Self {
                 freedom,
                 variance_px2: robust_start,
@@ -107,11 +117,12 @@ const FLOOR_PX: f64 = 2e-5;
 /// The distribution of the residuals, and the weight in 1/px^2 that it gives to every corner.
 ///
 /// A corner behind its camera gets weight 0. `strength` scales all weights: 1 for independent
-/// corners, less if neighboring corners err alike.
+/// corners, less if neighboring corners err alike. `known`: see [`StudentT::fit`].
 pub fn reweight(
     residuals: &[Vec<Option<Vector2<f64>>>],
     observations: &Observations,
     strength: f64,
+    known: Option<&StudentT>,
 ) -> (StudentT, Weights) {
     let squared: Vec<Vec<Option<f64>>> = residuals
         .iter()
@@ -128,7 +139,7 @@ pub fn reweight(
         })
         .collect();
     let flat: Vec<f64> = squared.iter().flatten().filter_map(|s| *s).collect();
-    let noise = StudentT::fit(&flat, FLOOR_PX * FLOOR_PX);
+    let noise = StudentT::fit(&flat, FLOOR_PX * FLOOR_PX, known);
     let weights = squared
         .iter()
         .zip(&observations.views)
@@ -166,7 +177,7 @@ mod tests {
 
     #[test]
     fn gaussian_residuals_are_least_squares() {
-        let fit = StudentT::fit(&gaussian(5000, 0.05), 1e-12);
+        let fit = StudentT::fit(&gaussian(5000, 0.05), 1e-12, None);
         assert!(fit.freedom >= 20.0, "nu = {}", fit.freedom);
         // Standard error of a standard deviation from 10^4 numbers: 0.7 %.
         assert!((fit.variance_px2.sqrt() / 0.05 - 1.0).abs() < 0.03);
@@ -178,7 +189,7 @@ mod tests {
         for s in squared.iter_mut().step_by(20) {
             *s = 25.0;
         }
-        let fit = StudentT::fit(&squared, 1e-12);
+        let fit = StudentT::fit(&squared, 1e-12, None);
         assert_eq!(fit.weight(25.0), 0.0);
         assert!((fit.variance_px2.sqrt() / 0.05 - 1.0).abs() < 0.1);
     }

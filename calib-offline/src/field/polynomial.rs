@@ -34,6 +34,36 @@ fn legendre(x: f64, degree: usize, value: &mut [f64], derivative: &mut [f64]) {
 /// Highest degree that [`basis`] evaluates.
 pub const MAX_DEGREE: usize = 15;
 
+/// Values of the single Legendre polynomials at a pixel; places beyond the degree are zero.
+#[derive(Debug, Clone, Copy)]
+pub struct AxisValues {
+    /// Along u.
+    pub u: [f64; MAX_DEGREE + 1],
+    /// Along v.
+    pub v: [f64; MAX_DEGREE + 1],
+}
+
+/// The polynomials up to a degree at a pixel, the sensor's outer edges at -1 and 1.
+///
+/// # Panics
+/// If `degree` is above [`MAX_DEGREE`].
+pub fn axis_values(sensor: SensorSize, degree: usize, pixel: PixelPoint) -> AxisValues {
+    let [x, y] = normalized(sensor, pixel);
+    let mut p = [[0.0; MAX_DEGREE + 1]; 4];
+    let [u, du, v, dv] = &mut p;
+    legendre(x, degree, u, du);
+    legendre(y, degree, v, dv);
+    AxisValues { u: p[0], v: p[2] }
+}
+
+fn normalized(sensor: SensorSize, pixel: PixelPoint) -> [f64; 2] {
+    let center = sensor.center();
+    [
+        (pixel.u - center.u) * 2.0 / f64::from(sensor.width),
+        (pixel.v - center.v) * 2.0 / f64::from(sensor.height),
+    ]
+}
+
 /// Every product with its derivatives by u and by v (per px) at a pixel: `[value, du, dv]`, in the
 /// order of [`terms`]. `x` and `y` run from -1 to 1 between the sensor's outer edges.
 ///
@@ -44,15 +74,15 @@ pub fn basis(sensor: SensorSize, degree: usize, pixel: PixelPoint, out: &mut Vec
         degree <= MAX_DEGREE,
         "degree {degree} is above {MAX_DEGREE}"
     );
-    let center = sensor.center();
+    let [x, y] = normalized(sensor, pixel);
     let (scale_u, scale_v) = (
         2.0 / f64::from(sensor.width),
         2.0 / f64::from(sensor.height),
     );
     let mut p = [[0.0; MAX_DEGREE + 1]; 4];
     let [px, dx, py, dy] = &mut p;
-    legendre((pixel.u - center.u) * scale_u, degree, px, dx);
-    legendre((pixel.v - center.v) * scale_v, degree, py, dy);
+    legendre(x, degree, px, dx);
+    legendre(y, degree, py, dy);
     out.clear();
     out.extend(terms(degree).map(|(i, j)| {
         [

@@ -235,7 +235,7 @@ fn adjust_cubic(
     };
     for _ in 0..rounds {
         let residuals = normal_equations::residuals(&model, observations, &bases);
-        let (_, weights) = reweight(&residuals, observations, 1.0);
+        let (_, weights) = reweight(&residuals, observations, 1.0, None);
         model = levenberg::minimize(model, observations, &bases, &weights, &priors, settings).model;
     }
     let mut lengths_px: Vec<f64> = normal_equations::residuals(&model, observations, &bases)

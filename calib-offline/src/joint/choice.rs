@@ -148,8 +148,8 @@ impl Search<'_> {
             }
             _ => {
                 self.best = splined;
-                if self.offsets() {
-                    self.drop_spline();
+                if self.offsets() && self.drop_spline() {
+                    self.lenses();
                 }
             }
         }

@@ -1,12 +1,15 @@
 //! How strongly smoothness holds, from the data themselves (METHOD 2.4, 9A).
 
 use super::fit::Fit;
+use crate::adjust::banded::BandedMatrix;
+use crate::adjust::knots::KnotOrder;
 use crate::adjust::model::Layout;
 use crate::adjust::normal_equations::{CameraPriors, Priors, Reduced};
 use crate::adjust::{CameraModel, Model};
 use nalgebra::DVector;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::sync::Arc;
 
 /// Inverse variances at the start: directions may move by 1e-3 rad, a spline's second differences
 /// by 3e-5 rad, an offset by 1e-3 mm. The offset starts nearly central on purpose: started free it
@@ -48,11 +51,36 @@ struct Group {
     /// Which of the camera's amounts belong; empty for a spline (all do).
     members: Vec<usize>,
     precision: f64,
-    /// Of a spline, of the energy behind it; else 0.
-    energy_ln_determinant: f64,
+    /// What the weight of a spline is of.
+    energy: Option<Arc<SplineEnergy>>,
     last_log_step: f64,
     growth: f64,
     effective: f64,
+}
+
+/// The thin-plate energy of a grid, with what is asked of it in every round.
+#[derive(Debug)]
+struct SplineEnergy {
+    order: KnotOrder,
+    thin_plate: Arc<BandedMatrix>,
+    ln_determinant: f64,
+    probes: Vec<DVector<f64>>,
+    /// The energy times each probe.
+    weighted: Vec<DVector<f64>>,
+}
+
+impl SplineEnergy {
+    fn new(order: KnotOrder) -> Self {
+        let thin_plate = order.thin_plate();
+        let probes = probes(thin_plate.size());
+        Self {
+            weighted: probes.iter().map(|probe| thin_plate.times(probe)).collect(),
+            probes,
+            ln_determinant: order.thin_plate_ln_determinant(),
+            thin_plate: Arc::new(thin_plate),
+            order,
+        }
+    }
 }
 
 /// The smoothness weights of all cameras.
@@ -108,12 +136,19 @@ impl Smoothness {
                     Family::Spline => START_SPLINE,
                     Family::Pupil | Family::Offset(_) => START_OFFSET,
                 };
-                let energy_ln_determinant = match (family, camera.knot_order()) {
-                    (Family::Spline, Some(order)) => order.thin_plate_ln_determinant(),
-                    _ => 0.0,
-                };
+                let energy = camera
+                    .knot_order()
+                    .filter(|_| family == Family::Spline)
+                    .map(|order| {
+                        // The cameras of a rig often have the same sensor and so the same grid.
+                        old.iter()
+                            .chain(&self.groups)
+                            .filter_map(|group| group.energy.as_ref())
+                            .find(|energy| energy.order == order)
+                            .map_or_else(|| Arc::new(SplineEnergy::new(order)), Arc::clone)
+                    });
                 self.groups.push(Group {
-                    energy_ln_determinant,
+                    energy,
                     camera_idx,
                     family,
                     members,
@@ -128,7 +163,17 @@ impl Smoothness {
 
     /// As priors of an adjustment.
     pub fn priors(&self, model: &Model, board: f64) -> Priors {
-        let mut cameras: Vec<_> = model.cameras.iter().map(CameraPriors::free).collect();
+        let mut cameras: Vec<_> = model
+            .cameras
+            .iter()
+            .enumerate()
+            .map(|(camera_idx, camera)| {
+                let own = self.groups.iter().filter(|g| g.camera_idx == camera_idx);
+                let energy = own.filter_map(|group| group.energy.as_ref()).next();
+                let thin_plate = energy.map(|energy| Arc::clone(&energy.thin_plate));
+                CameraPriors::with_energy(camera, thin_plate)
+            })
+            .collect();
         for group in &self.groups {
             let priors = &mut cameras[group.camera_idx];
             let target = match group.family {
@@ -149,21 +194,20 @@ impl Smoothness {
     /// One fixed-point step of every weight (MacKay): `lambda <- gamma / energy` with
     /// `gamma = dim - lambda tr(S covariance)`, the number of parameters that the data determine,
     /// and `energy = a^T S a`.
-    pub fn update(&mut self, model: &Model, layout: &Layout, priors: &Priors, reduced: &Reduced) {
+    pub fn update(&mut self, model: &Model, layout: &Layout, reduced: &Reduced) {
         let variances = reduced.global_variances();
         for group in &mut self.groups {
             let camera = &model.cameras[group.camera_idx];
             let (dimension, trace, energy) = match group.family {
                 Family::Spline => {
-                    let Some(thin_plate) = &priors.cameras[group.camera_idx].thin_plate else {
+                    let Some(energy) = &group.energy else {
                         continue;
                     };
                     let amounts = camera.spline_amounts();
-                    let probes = probes(amounts.len());
                     (
                         amounts.len() as f64,
-                        reduced.spline_trace(group.camera_idx, thin_plate, &probes),
-                        thin_plate.times(&amounts).dot(&amounts),
+                        reduced.spline_trace(group.camera_idx, &energy.probes, &energy.weighted),
+                        energy.thin_plate.times(&amounts).dot(&amounts),
                     )
                 }
                 Family::Direction(_) => {
@@ -198,7 +242,8 @@ impl Smoothness {
             .iter()
             .map(|group| {
                 let count = parameter_count(group, &model.cameras[group.camera_idx]) as f64;
-                count * group.precision.ln() + group.energy_ln_determinant
+                let energy = group.energy.as_ref().map_or(0.0, |e| e.ln_determinant);
+                count * group.precision.ln() + energy
             })
             .sum()
     }

@@ -14,6 +14,12 @@ use nalgebra::Vector2;
 /// Standard deviation of each coefficient of the board's shape before anything is seen, mm.
 const BOARD_SHAPE_SD_MM: f64 = 0.1;
 
+/// The adjustment where a round's step went too far.
+const RETRY: Settings = Settings {
+    max_iterations: 2,
+    relative_decrease: 1e-9,
+};
+
 /// A model on its way to the best one.
 #[derive(Debug, Clone)]
 pub struct Fit {
@@ -31,6 +37,8 @@ pub struct Fit {
     pub stop: StopReason,
     /// Number of parameters that the data determine.
     effective_parameters: f64,
+    /// Whether the noise is that of residuals, and not yet its start.
+    is_weighted: bool,
     bases: Vec<ViewBasis>,
     residuals: Vec<Vec<Option<Vector2<f64>>>>,
 }
@@ -51,6 +59,7 @@ impl Fit {
             costs: Vec::new(),
             stop: StopReason::IterationLimit,
             effective_parameters: 0.0,
+            is_weighted: false,
             bases,
             residuals,
         }
@@ -76,7 +85,13 @@ impl Fit {
         let numbers = 2.0 * observations.corner_count() as f64;
         // The residuals of a fit are smaller than the noise by the parameters that it used up.
         let freedom = (1.0 - self.effective_parameters / numbers).max(0.1);
-        let (noise, weights) = reweight(&self.residuals, observations, self.share * freedom);
+        let (noise, weights) = reweight(
+            &self.residuals,
+            observations,
+            self.share * freedom,
+            self.is_weighted.then_some(&self.noise),
+        );
+        self.is_weighted = true;
         self.noise = StudentT {
             variance_px2: noise.variance_px2 / freedom,
             ..noise
@@ -90,7 +105,7 @@ impl Fit {
     }
 
     /// New weights, then an adjustment with them.
-    pub fn adjust(&mut self, observations: &Observations, max_iterations: usize) {
+    pub fn adjust(&mut self, observations: &Observations, settings: Settings) {
         let weights = self.reweight(observations);
         let priors = self.priors();
         let outcome = levenberg::minimize(
@@ -99,10 +114,7 @@ impl Fit {
             &self.bases,
             &weights,
             &priors,
-            Settings {
-                max_iterations,
-                ..Settings::default()
-            },
+            settings,
         );
         self.model = outcome.model;
         self.costs = outcome.costs;
@@ -141,9 +153,9 @@ impl Fit {
             self.model = stepped;
             self.residuals = residuals;
         } else {
-            self.adjust(observations, 2);
+            self.adjust(observations, RETRY);
         }
-        self.update_smoothness(&layout, &priors, &reduced, observations);
+        self.update_smoothness(&layout, &reduced, observations);
         Ok(evidence)
     }
 
@@ -175,11 +187,10 @@ impl Fit {
     fn update_smoothness(
         &mut self,
         layout: &Layout,
-        priors: &Priors,
         reduced: &Reduced,
         observations: &Observations,
     ) {
-        self.smoothness.update(&self.model, layout, priors, reduced);
+        self.smoothness.update(&self.model, layout, reduced);
         let (effective, held) = self.smoothness.effective(&self.model);
         let splines: usize = self
             .model
