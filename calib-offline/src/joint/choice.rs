@@ -6,6 +6,7 @@ use super::fit::Fit;
 use crate::adjust::{Model, Observations};
 use crate::field::SmoothMap;
 use crate::field::spline::{Spline, SplineGrid};
+use serde::{Deserialize, Serialize};
 
 /// Spacings tried, in cells along the sensor's longer side, coarse to fine: 112, 56, 40 and 28 px
 /// on 1280 px. The search stops when the evidence falls.
@@ -25,14 +26,35 @@ const HOPELESS_CHANGES: f64 = 10.0;
 /// and Raftery (1995). Ties go to the simpler model.
 const NEEDED_GAIN: f64 = 4.0;
 
+/// A change of the model that was best until then.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Alternative {
+    /// Every camera gets an offset: its rays need not meet in one point.
+    Offsets,
+    /// Every camera's direction gets a spline, or one of another spacing.
+    Spline {
+        /// Cells along the sensor's longer side.
+        cells: f64,
+    },
+    /// One camera loses its offset.
+    Central {
+        /// Index of the camera.
+        camera_idx: usize,
+    },
+    /// All cameras lose their splines.
+    NoSpline,
+}
+
 /// An alternative that was tried.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Choice {
-    /// In words.
-    pub what: String,
-    /// Twice its log evidence minus that of the model that was best until then; minus infinity if
-    /// the data leave a parameter of it open, and only roughly so if it is far behind.
-    pub gain: f64,
+    /// What it changes.
+    pub tried: Alternative,
+    /// Twice its log evidence minus that of the model that was best until then; `None` if the data
+    /// leave a parameter of it open, and only roughly so if it is far behind.
+    pub gain: Option<f64>,
     /// Whether it was taken.
     pub taken: bool,
 }
@@ -76,7 +98,7 @@ pub fn choose(start: Candidate, observations: &Observations) -> (Candidate, Vec<
     take_if_better(
         &mut best,
         &mut tried,
-        "offsets of all cameras".to_string(),
+        Alternative::Offsets,
         NEEDED_GAIN,
         observations,
         add_offsets,
@@ -85,7 +107,7 @@ pub fn choose(start: Candidate, observations: &Observations) -> (Candidate, Vec<
         let taken = take_if_better(
             &mut best,
             &mut tried,
-            format!("spline of {cells:.0} cells along the longer side"),
+            Alternative::Spline { cells },
             NEEDED_GAIN,
             observations,
             |model| set_spline(model, cells),
@@ -105,7 +127,7 @@ pub fn simplify(best: &mut Candidate, tried: &mut Vec<Choice>, observations: &Ob
             take_if_better(
                 best,
                 tried,
-                format!("camera {camera_idx} central"),
+                Alternative::Central { camera_idx },
                 -NEEDED_GAIN,
                 observations,
                 |model| model.cameras[camera_idx].field.offset = None,
@@ -122,7 +144,7 @@ pub fn simplify(best: &mut Candidate, tried: &mut Vec<Choice>, observations: &Ob
         take_if_better(
             best,
             tried,
-            "no spline".to_string(),
+            Alternative::NoSpline,
             -NEEDED_GAIN,
             observations,
             |model| {
@@ -136,8 +158,8 @@ pub fn simplify(best: &mut Candidate, tried: &mut Vec<Choice>, observations: &Ob
 
 fn take_if_better(
     best: &mut Candidate,
-    tried: &mut Vec<Choice>,
-    what: String,
+    choices: &mut Vec<Choice>,
+    tried: Alternative,
     needed: f64,
     observations: &Observations,
     change: impl FnOnce(&mut Model),
@@ -145,16 +167,20 @@ fn take_if_better(
     // A model that the data leave open has no evidence for it; the one so far stands.
     let changed = best.fit.changed(observations, change);
     let Ok(candidate) = Candidate::settle(changed, best.evidence, observations) else {
-        tried.push(Choice {
-            what,
-            gain: f64::NEG_INFINITY,
+        choices.push(Choice {
+            tried,
+            gain: None,
             taken: false,
         });
         return false;
     };
     let gain = candidate.evidence - best.evidence;
     let taken = gain > needed;
-    tried.push(Choice { what, gain, taken });
+    choices.push(Choice {
+        tried,
+        gain: Some(gain),
+        taken,
+    });
     if taken {
         *best = candidate;
     }

@@ -18,7 +18,7 @@ const DEGREE: usize = 7;
 const STRUCTURED_ROUNDS: usize = 3;
 const STRUCTURED_STEPS: usize = 3;
 /// Steps of the last adjustment, at most; it needs three or four.
-const LAST_STEPS: usize = 30;
+pub(super) const LAST_STEPS: usize = 30;
 
 /// The result of the joint estimate.
 #[derive(Debug, Clone)]
@@ -35,6 +35,8 @@ pub struct Estimate {
     pub noise: StudentT,
     /// Correlation of neighboring corners' residuals.
     pub neighbor_correlation: f64,
+    /// Share of the corners that counts as independent because of it, 0 to 1.
+    pub effective_share: f64,
     /// Smoothness per camera and family.
     pub smoothness: Vec<SmoothnessFound>,
     /// What the evidence decided.
@@ -129,7 +131,8 @@ fn free_center_of_distortion(model: &mut Model) {
     }
 }
 
-fn finish(
+/// What a fit that is as good as it gets says.
+pub(super) fn finish(
     fit: Fit,
     observations: Observations,
     neighbor_correlation: f64,
@@ -159,6 +162,7 @@ fn finish(
         robust_weights,
         noise: fit.noise,
         neighbor_correlation,
+        effective_share: fit.share,
         choices,
         costs: fit.costs.clone(),
         stop: fit.stop,

@@ -7,6 +7,7 @@ use crate::adjust::{CameraModel, Model};
 use nalgebra::DVector;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 
 /// Inverse variances at the start: directions may move by 1e-3 rad, a spline's second differences
 /// by 3e-5 rad, an offset by 1e-3 mm. The offset starts nearly central on purpose: started free it
@@ -30,7 +31,8 @@ const PROBE_SEED: u64 = 0x5eed;
 pub const OFFSET_CORE_DEGREE: usize = 3;
 
 /// A family of parameters that share one smoothness weight.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Family {
     /// Directions of the field's polynomial of this total degree, beyond the structured ones.
     Direction(usize),
@@ -62,7 +64,7 @@ pub struct Smoothness {
 }
 
 /// What the evidence found for one family.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SmoothnessFound {
     /// Index of the camera.
     pub camera_idx: usize,

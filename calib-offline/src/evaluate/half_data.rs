@@ -1,0 +1,220 @@
+//! Two calibrations from two halves of the poses: do they differ as much as they say they may?
+//!
+//! Both halves triangulate the same exact pixels, so noise of the pixels has no part in it, and the
+//! rigid motion between the two rigs is taken out. What remains has a predicted covariance, the sum
+//! of both halves' own. A ratio above what chance allows means that the estimate does not know how
+//! uncertain it is: errors that go together, a model that does not fit, a board or camera that
+//! moved. What both halves have in common cancels and is **not** seen: a wrong square size, a
+//! board that bends the same way in every pose, a lens model that is wrong the same way.
+
+use super::working_volume::{Match, compare, matches_at};
+use crate::field::Rig;
+use crate::joint::Estimate;
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+
+/// Fewer poses are not halved: five hold no flexible field.
+pub const MIN_POSES: usize = 10;
+/// Quantile of the standard normal distribution: 95 % lie within so many standard deviations.
+const NORMAL_95: f64 = 1.96;
+
+/// The check, or why there is none.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum HalfDataCheck {
+    /// It was made.
+    Compared(HalfData),
+    /// It was not.
+    Skipped(Skipped),
+}
+
+/// Why the halves were not compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Skipped {
+    /// Nobody asked for it.
+    NotWanted,
+    /// One camera measures no points.
+    OneCamera,
+    /// Fewer poses than [`MIN_POSES`].
+    TooFewPoses {
+        /// How many there are.
+        have: usize,
+        /// How many it takes.
+        need: usize,
+    },
+    /// A half of the poses leaves a parameter open.
+    NoEstimate,
+    /// The halves have no calibrated pixels in common that see the same points.
+    NoCommonPoints,
+}
+
+/// What two halves of the poses say of each other.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct HalfData {
+    /// Poses of each half.
+    pub poses: [usize; 2],
+    /// Points compared, at the working distance.
+    pub points: usize,
+    /// RMS distance between the two halves' points, mm.
+    pub difference_rms_mm: f64,
+    /// What it was to be by both halves' covariances, mm.
+    pub predicted_rms_mm: f64,
+    /// The first over the second.
+    pub ratio: f64,
+    /// Number of independent ways in which the difference can vary, to judge the ratio by: few, as
+    /// a field errs smoothly.
+    pub modes: f64,
+    /// Where the ratio falls by chance in 95 of 100 cases if the covariances are right.
+    pub ratio_by_chance: [f64; 2],
+}
+
+impl HalfData {
+    /// Whether the halves differ by more than chance explains.
+    pub fn is_larger(&self) -> bool {
+        // Written so that NaN counts as larger.
+        !(self.ratio <= self.ratio_by_chance[1])
+    }
+
+    /// Whether they differ by less.
+    pub fn is_smaller(&self) -> bool {
+        self.ratio < self.ratio_by_chance[0]
+    }
+}
+
+/// The two halves of some poses.
+#[derive(Debug)]
+pub struct Halves {
+    /// Their estimates.
+    pub estimates: [Estimate; 2],
+    /// The rigs that these gave.
+    pub rigs: [Rig; 2],
+}
+
+/// Which poses are in the first half: every other one of each placement, in the order of their
+/// numbers, so that both halves have all angles and all placements. Poses without a placement
+/// count as one.
+pub fn first_half(
+    poses: impl IntoIterator<Item = usize>,
+    placement: impl Fn(usize) -> Option<usize>,
+) -> BTreeSet<usize> {
+    let poses: BTreeSet<usize> = poses.into_iter().collect();
+    let mut by_placement: Vec<usize> = poses.into_iter().collect();
+    by_placement.sort_by_key(|pose| (placement(*pose), *pose));
+    by_placement.into_iter().step_by(2).collect()
+}
+
+/// Estimates both halves, as `Estimate::of_poses` does.
+///
+/// Cost: less than one estimate, the two in parallel.
+///
+/// # Errors
+/// Why there are none.
+pub fn estimate_halves(estimate: &Estimate, first: &BTreeSet<usize>) -> Result<Halves, Skipped> {
+    if estimate.model.cameras.len() < 2 {
+        return Err(Skipped::OneCamera);
+    }
+    if estimate.pose_count() < MIN_POSES {
+        return Err(Skipped::TooFewPoses {
+            have: estimate.pose_count(),
+            need: MIN_POSES,
+        });
+    }
+    let mut estimates: Vec<Estimate> = [true, false]
+        .into_par_iter()
+        .map(|half| estimate.of_poses(|pose| first.contains(&pose) == half).ok())
+        .collect::<Option<_>>()
+        .ok_or(Skipped::NoEstimate)?;
+    let (Some(b), Some(a)) = (estimates.pop(), estimates.pop()) else {
+        return Err(Skipped::NoEstimate);
+    };
+    let names: Vec<String> = (0..a.model.cameras.len()).map(|k| k.to_string()).collect();
+    let rigs = [a.rig(&names), b.rig(&names)];
+    Ok(Halves {
+        estimates: [a, b],
+        rigs,
+    })
+}
+
+impl Halves {
+    /// Compares the points of both halves at a distance of the whole estimate's first camera.
+    ///
+    /// # Errors
+    /// Why there is nothing to compare.
+    pub fn compared(&mut self, whole: &Rig, distance_mm: f64) -> Result<HalfData, Skipped> {
+        let matches = matches_at(whole, &[distance_mm]);
+        let [rig_a, rig_b] = &self.rigs;
+        let compared = compare(rig_a, rig_b, &matches).ok_or(Skipped::NoCommonPoints)?;
+        let covariance = self
+            .predicted(&compared.matches, &compared.first_from_second.rotation)
+            .ok_or(Skipped::NoEstimate)?;
+        let points = compared.difference.points;
+        let total = covariance.trace();
+        let modes = total * total / covariance.norm_squared();
+        let predicted_rms_mm = (total / points as f64).sqrt();
+        let difference_rms_mm = compared.difference.rms_mm;
+        Ok(HalfData {
+            poses: [0, 1].map(|k| self.estimates[k].pose_count()),
+            points,
+            difference_rms_mm,
+            predicted_rms_mm,
+            ratio: difference_rms_mm / predicted_rms_mm,
+            modes,
+            ratio_by_chance: [-NORMAL_95, NORMAL_95].map(|z| ratio_quantile(modes, z)),
+        })
+    }
+
+    /// Covariance of the difference, in the first half's frame.
+    fn predicted(
+        &mut self,
+        matches: &[Match],
+        first_from_second: &nalgebra::Matrix3<f64>,
+    ) -> Option<DMatrix<f64>> {
+        let [a, b] = &mut self.estimates;
+        let [rig_a, rig_b] = &self.rigs;
+        let mut sum = a.point_covariance(rig_a, matches).ok()??;
+        let other = b.point_covariance(rig_b, matches).ok()??;
+        for row in (0..sum.nrows()).step_by(3) {
+            for column in (0..sum.ncols()).step_by(3) {
+                let own = other.fixed_view::<3, 3>(row, column);
+                let mut target = sum.fixed_view_mut::<3, 3>(row, column);
+                target += first_from_second * own * first_from_second.transpose();
+            }
+        }
+        Some(sum)
+    }
+}
+
+/// Quantile of the ratio of an RMS to its expectation at `z` standard deviations, for a sum of
+/// squares with so many independent modes (Wilson and Hilferty's form of chi-square).
+fn ratio_quantile(modes: f64, z: f64) -> f64 {
+    let spread = 2.0 / (9.0 * modes);
+    (1.0 - spread + z * spread.sqrt()).max(0.0).powf(1.5)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halves_alternate_within_placements_and_are_even() {
+        // Two placements of five, recorded in turn.
+        let half = first_half(0..10, |pose| Some(pose % 2));
+        assert_eq!(half, BTreeSet::from([0, 4, 8, 3, 7]));
+        let free = first_half([9, 3, 5, 3], |_| None);
+        assert_eq!(free, BTreeSet::from([3, 9]));
+    }
+
+    #[test]
+    fn chance_is_that_of_chi_square() {
+        // Chi-square of 10: 2.5 % lie below 3.247 and 2.5 % above 20.483.
+        assert!((ratio_quantile(10.0, -NORMAL_95) - 0.3247_f64.sqrt()).abs() < 3e-3);
+        assert!((ratio_quantile(10.0, NORMAL_95) - 2.0483_f64.sqrt()).abs() < 3e-3);
+        // One mode: a normal variable's size, 2.241 at the most (Wilson and Hilferty: 2.25).
+        assert!((ratio_quantile(1.0, NORMAL_95) - 2.241).abs() < 0.02);
+        assert!(ratio_quantile(1.0, -NORMAL_95) < 0.04);
+    }
+}
