@@ -36,7 +36,8 @@ pub fn central_model(estimate: &Estimate, rig: &Rig, matches: &[Match]) -> Centr
             offsets_gain: offsets_gain(&estimate.choices),
         };
     }
-    let Ok(central) = estimate.made_central() else {
+    let central = estimate.made_central().ok();
+    let Some(central) = central.filter(|central| central.evidence_loss.is_finite()) else {
         return CentralModel::NoEstimate;
     };
     let names: Vec<String> = rig.cameras.iter().map(|c| c.name.clone()).collect();

@@ -18,7 +18,8 @@ pub struct Centrality {
     /// The largest distance, mm.
     pub max_mm: f64,
     /// RMS distance of the same rays in each of two estimates from half of the poses: how far
-    /// they lie apart says how well `rms_mm` is known. `None` without a half-data check.
+    /// they lie apart says how well `rms_mm` is known. `None` for a central
+    /// camera and without a half-data check.
     pub halves_rms_mm: Option<[f64; 2]>,
 }
 
@@ -30,6 +31,9 @@ pub fn centrality(camera: &CalibratedCamera) -> Centrality {
 impl Centrality {
     /// Adds what two other estimates say of the same pixels.
     pub fn with_halves(self, camera: &CalibratedCamera, halves: [&RayField; 2]) -> Self {
+        if self.central {
+            return self;
+        }
         let pixels = camera.coverage.covered_middles();
         Self {
             halves_rms_mm: Some(halves.map(|field| over(field, &pixels).rms_mm)),

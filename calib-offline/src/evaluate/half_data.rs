@@ -75,8 +75,7 @@ pub struct HalfData {
 impl HalfData {
     /// Whether the halves differ by more than chance explains.
     pub fn is_larger(&self) -> bool {
-        // Written so that NaN counts as larger.
-        !(self.ratio <= self.ratio_by_chance[1])
+        self.ratio > self.ratio_by_chance[1]
     }
 
     /// Whether they differ by less.
@@ -156,12 +155,16 @@ impl Halves {
         let modes = total * total / covariance.norm_squared();
         let predicted_rms_mm = (total / points as f64).sqrt();
         let difference_rms_mm = compared.difference.rms_mm;
+        let ratio = difference_rms_mm / predicted_rms_mm;
+        if !ratio.is_finite() {
+            return Err(Skipped::NoCommonPoints);
+        }
         Ok(HalfData {
             poses: [0, 1].map(|k| self.estimates[k].pose_count()),
             points,
             difference_rms_mm,
             predicted_rms_mm,
-            ratio: difference_rms_mm / predicted_rms_mm,
+            ratio,
             modes,
             ratio_by_chance: [-NORMAL_95, NORMAL_95].map(|z| ratio_quantile(modes, z)),
         })

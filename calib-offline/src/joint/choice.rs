@@ -24,7 +24,7 @@ const HOPELESS_GAP: f64 = 100.0;
 const HOPELESS_CHANGES: f64 = 10.0;
 /// Twice the log evidence that a more flexible model must gain: "positive" on the scale of Kass
 /// and Raftery (1995). Ties go to the simpler model.
-const NEEDED_GAIN: f64 = 4.0;
+pub const NEEDED_GAIN: f64 = 4.0;
 
 /// A change of the model that was best until then.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -6,14 +6,14 @@ use crate::adjust::StopReason;
 use crate::dataset::identity::input_sha256;
 use crate::dataset::{Dataset, stage};
 use crate::detect::verdict::Outcome;
-use crate::evaluate::HeldOut;
-use crate::evaluate::fit_stage_axes;
+use crate::evaluate::half_data::HalfDataCheck;
+use crate::evaluate::{CrossChecks, HeldOut, fit_stage_axes};
 use crate::evaluate::verdict::{Figures, Thresholds, judge};
 use crate::field::Rig;
 use crate::init::screening::{Finding, FindingKind};
 use crate::joint::Estimate;
 use crate::report::record::{
-    Calibration, CornerRecord, EstimateRecord, HeldOutRecord, LeftOut, PoseRecord, Renumbered,
+    Calibration, ChoicesRecord, CornerRecord, EstimateRecord, HeldOutRecord, LeftOut, PoseRecord, Renumbered,
     SCHEMA, StageAxis,
 };
 use nalgebra::Vector2;
@@ -32,8 +32,12 @@ pub struct Parts<'a> {
     pub rig: Rig,
     /// What was found wrong with views.
     pub findings: &'a [Finding],
+    /// Peak to valley of the board's shape and its standard deviation, mm.
+    pub board_peak_to_valley_mm: (f64, f64),
     /// The check on unseen boards.
     pub held_out: &'a HeldOut,
+    /// The checks against itself.
+    pub checks: CrossChecks,
     /// What counts as good.
     pub thresholds: &'a Thresholds,
 }
@@ -58,6 +62,10 @@ pub fn record(parts: &Parts) -> Calibration {
             rms_px: summary.rms_px,
             held_out_rms_px: held_out.as_ref().and_then(|h| h.rms_px),
             neighbor_rms_percent: held_out.as_ref().and_then(|h| h.neighbor_rms_percent),
+            half_data_ratio: match &parts.checks.half_data {
+                HalfDataCheck::Compared(halves) => Some(halves.ratio),
+                HalfDataCheck::Skipped(_) => None,
+            },
             corners: (summary.corners_used, summary.corners_rejected),
             suspect_views: (parts.findings.len(), parts.observations.views.len()),
             pose_count: estimate.pose_count(),
@@ -87,7 +95,9 @@ pub fn record(parts: &Parts) -> Calibration {
         left_out: left_out(parts, &names),
         renumbered: renumbered(parts.findings, &names),
         estimate: summary,
+        choices: Some(choices(parts)),
         held_out,
+        checks: Some(parts.checks.clone()),
         verdict,
     }
 }
@@ -130,6 +140,20 @@ fn estimate_record(estimate: &Estimate, corners: &[CornerRecord]) -> EstimateRec
         rms_px: rms(&used).unwrap_or(0.0),
         corners_used: used.len(),
         corners_rejected: corners.len() - used.len(),
+    }
+}
+
+fn choices(parts: &Parts) -> ChoicesRecord {
+    let estimate = parts.estimate;
+    let (board_peak_to_valley_mm, board_peak_to_valley_sd_mm) = parts.board_peak_to_valley_mm;
+    ChoicesRecord {
+        tried: estimate.choices.clone(),
+        smoothness: estimate.smoothness.clone(),
+        noise_freedom: estimate.noise.freedom,
+        neighbor_correlation: estimate.neighbor_correlation,
+        effective_share: estimate.effective_share,
+        board_peak_to_valley_mm,
+        board_peak_to_valley_sd_mm,
     }
 }
 

@@ -1,9 +1,12 @@
 //! The report page: one HTML file that needs nothing else, no network and no scripts.
 
 use super::facts::Facts;
+use super::choices_page;
 use super::plot::{Figure, cost, coverage, histogram, pose_rms, residual_vectors, scene};
 use super::record::Calibration;
 use super::text::short;
+use super::words;
+use crate::evaluate::half_data::HalfDataCheck;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde::Serialize;
 
@@ -64,7 +67,9 @@ pub fn page(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
                     (verdict(&facts))
                     (headline(calibration, &facts, blob))
                     (figures(calibration))
+                    (choices_page::draw(calibration))
                     (left_out(calibration))
+                    (renumbered(calibration))
                     (provenance(calibration))
                 }
             }
@@ -117,6 +122,14 @@ fn headline(calibration: &Calibration, facts: &Facts, blob: Option<&BlobFacts>) 
                 (card("Held-out check", &format!("{} folds", held_out.folds), &format!("by pose; {} points, {} outside the calibrated area", held_out.point_count, held_out.outside_count)))
             } @else {
                 (card("Held-out check", "none", "too few poses to leave some out"))
+            }
+            @if let Some(checks) = &calibration.checks {
+                @match &checks.half_data {
+                    HalfDataCheck::Compared(halves) => {
+                        (card("Half-data check", &format!("ratio {:.2}", halves.ratio), &format!("two halves of the poses differ by {} mm RMS, {} predicted", short(halves.difference_rms_mm), short(halves.predicted_rms_mm))))
+                    }
+                    HalfDataCheck::Skipped(_) => (card("Half-data check", "none", &words::half_data(&checks.half_data))),
+                }
             }
             (card("Corner noise", &px(facts.sigma_px), "standard deviation per axis, robust estimate"))
             (card("Residual", &px(facts.rms_px), &format!("RMS residual vector of the {} corners used", facts.corners_used)))
@@ -215,6 +228,27 @@ fn left_out(calibration: &Calibration) -> Markup {
     }
 }
 
+fn renumbered(calibration: &Calibration) -> Markup {
+    html! {
+        @if !calibration.renumbered.is_empty() {
+            section {
+                h2 { "Renumbered" }
+                p.read { "These images are used, with their corners numbered from the other end of the board." }
+                div.scroll {
+                    table {
+                        thead { tr { th { "Pose" } th { "Camera" } th { "Reason" } } }
+                        tbody {
+                            @for view in &calibration.renumbered {
+                                tr { td.number { (view.pose) } td { (view.camera) } td { (view.reason) } }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
 fn provenance(calibration: &Calibration) -> Markup {
     let board = &calibration.board;
     html! {
@@ -265,6 +299,11 @@ mod tests {
             "200.00 mm",
             "48320 bytes",
             "excluded by the user",
+            "numbered from the other end of the board than in camera left",
+            "ratio 1.04",
+            "17 of 72",
+            "+607",
+            "spline of 11.5 cells",
             &"9f2c4e".repeat(3),
         ] {
             assert!(page.contains(part), "{part} is not in the page");
@@ -291,6 +330,8 @@ mod tests {
         calibration.poses.clear();
         calibration.left_out.clear();
         calibration.held_out = None;
+        calibration.choices = None;
+        calibration.checks = None;
         calibration.estimate.cost_per_iteration.clear();
         calibration.estimate.sigma_px = f64::NAN;
         let page = page(&calibration, None);
