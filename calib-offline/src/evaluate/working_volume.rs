@@ -105,6 +105,9 @@ pub fn compare(first: &Rig, second: &Rig, matches: &[Match]) -> Option<Compared>
             rms_mm: (sum / found.len() as f64).sqrt(),
             max_mm: most.sqrt(),
         },
-        matches: found.into_iter().map(|(sightings, _, _)| sightings).collect(),
+        matches: found
+            .into_iter()
+            .map(|(sightings, _, _)| sightings)
+            .collect(),
     })
 }

@@ -7,14 +7,14 @@ use crate::dataset::identity::input_sha256;
 use crate::dataset::{Dataset, stage};
 use crate::detect::verdict::Outcome;
 use crate::evaluate::half_data::HalfDataCheck;
-use crate::evaluate::{CrossChecks, HeldOut, fit_stage_axes};
 use crate::evaluate::verdict::{Figures, Thresholds, judge};
+use crate::evaluate::{CrossChecks, HeldOut, fit_stage_axes};
 use crate::field::Rig;
 use crate::init::screening::{Finding, FindingKind};
 use crate::joint::Estimate;
 use crate::report::record::{
-    Calibration, ChoicesRecord, CornerRecord, EstimateRecord, HeldOutRecord, LeftOut, PoseRecord, Renumbered,
-    SCHEMA, StageAxis,
+    Calibration, ChoicesRecord, CornerRecord, EstimateRecord, HeldOutRecord, LeftOut, PoseRecord,
+    Renumbered, SCHEMA, StageAxis,
 };
 use nalgebra::Vector2;
 

@@ -4,6 +4,8 @@ use super::record::{Calibration, ChoicesRecord};
 use super::text::short;
 use super::words;
 use crate::evaluate::CrossChecks;
+use crate::joint::Family;
+use crate::joint::choice::NEEDED_GAIN;
 use maud::{Markup, html};
 
 /// The sections; nothing for a record of an earlier version.
@@ -18,7 +20,7 @@ fn cross_checks(calibration: &Calibration, checks: &CrossChecks) -> Markup {
     html! {
         section {
             h2 { "Checks against itself" }
-            p.read { strong { "How to read this. " } "The half-data check calibrates from every other pose and from the rest, and compares points of the same pixels at the working distance, a rigid motion apart. Good: a ratio within what chance allows. Above it, errors go together in a way that the estimate does not know, so its standard deviations are too small. What both halves have in common cancels and is not seen: the square's size, a board that is always bent the same way." }
+            p.read { strong { "How to read this. " } "The half-data check calibrates from every other pose and from the rest, and compares points of the same pixels at the working distance, a rigid motion apart. Good: a ratio within what chance allows. Above it, errors go together in a way that the estimate does not know, so its standard deviations are too small. What both halves have in common cancels and is not seen: the square's size, a board that is always bent the same way, detail of the lens that both halves smooth away alike (then the ratio is small)." }
             dl {
                 dt { "Half-data check" } dd { (words::half_data(&checks.half_data)) }
                 dt { "Central model" } dd { (words::central_model(&checks.central_model)) }
@@ -44,11 +46,22 @@ fn cross_checks(calibration: &Calibration, checks: &CrossChecks) -> Markup {
     }
 }
 
+/// Families of numbers that any camera has, in the order of the record.
+fn families(choices: &ChoicesRecord) -> Vec<Family> {
+    let mut families = Vec::new();
+    for found in &choices.smoothness {
+        if !families.contains(&found.family) {
+            families.push(found.family);
+        }
+    }
+    families
+}
+
 fn chosen(calibration: &Calibration, choices: &ChoicesRecord) -> Markup {
     html! {
         section {
             h2 { "Chosen by the data" }
-            p.read { strong { "How to read this. " } "Evidence is twice the logarithm of how probable a model makes the data: a more flexible model is taken if it gains more than 4, and kept as long as a simpler one loses more than 4. Of the numbers that a model has, the data use as many as they determine; the others are held by smoothness." }
+            p.read { strong { "How to read this. " } "Evidence is twice the logarithm of how probable a model makes the data: a more flexible model is taken if it gains more than " (NEEDED_GAIN) ", and kept as long as a simpler one loses more than that. Of the numbers that a model has, the data use as many as they determine; the others are held by smoothness." }
             dl {
                 dt { "Board's shape" } dd { (words::board(choices)) }
                 dt { "Noise" } dd { (words::noise(choices)) }
@@ -70,13 +83,19 @@ fn chosen(calibration: &Calibration, choices: &ChoicesRecord) -> Markup {
                 }
                 div.scroll {
                     table {
-                        thead { tr { th { "Camera" } th { "Numbers" } th { "Used" } } }
+                        thead { tr { th { "Numbers used" } @for camera in &calibration.rig.cameras { th { (camera.name) } } } }
                         tbody {
-                            @for found in &choices.smoothness {
+                            @for family in families(choices) {
                                 tr {
-                                    td { @match calibration.rig.cameras.get(found.camera_idx) { Some(camera) => (camera.name), None => "-" } }
-                                    td { (words::family(found.family)) }
-                                    td.number { (format!("{:.1}", found.effective)) " of " (found.parameters) }
+                                    td { (words::family(family)) }
+                                    @for camera_idx in 0..calibration.rig.cameras.len() {
+                                        td.number {
+                                            @match choices.numbers(camera_idx, |own| own == family) {
+                                                Some(numbers) => { (format!("{:.1}", numbers.effective)) " of " (numbers.all) }
+                                                None => "-",
+                                            }
+                                        }
+                                    }
                                 }
                             }
                         }

@@ -1,7 +1,7 @@
 //! The report page: one HTML file that needs nothing else, no network and no scripts.
 
-use super::facts::Facts;
 use super::choices_page;
+use super::facts::Facts;
 use super::plot::{Figure, cost, coverage, histogram, pose_rms, residual_vectors, scene};
 use super::record::Calibration;
 use super::text::short;
@@ -302,7 +302,7 @@ mod tests {
             "numbered from the other end of the board than in camera left",
             "ratio 1.04",
             "17 of 72",
-            "+607",
+            "+606.8",
             "spline of 11.5 cells",
             &"9f2c4e".repeat(3),
         ] {

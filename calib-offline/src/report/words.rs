@@ -5,6 +5,7 @@ use super::text::short;
 use crate::evaluate::central_model::CentralModel;
 use crate::evaluate::centrality::Centrality;
 use crate::evaluate::half_data::{HalfData, HalfDataCheck, Skipped};
+use crate::joint::evidence::OFFSET_CORE_DEGREE;
 use crate::joint::{Alternative, Choice, Family};
 
 /// How many numbers of a kind there are, and how many of them the data determine.
@@ -79,7 +80,7 @@ pub fn central_model(found: &CentralModel) -> String {
         CentralModel::IsCentral { offsets_gain } => {
             let evidence = offsets_gain.map_or_else(
                 || "the data leave offsets open".to_owned(),
-                |gain| format!("offsets would change the evidence by {gain:+.0}"),
+                |gain| format!("offsets would change the evidence by {}", change(gain)),
             );
             format!("costs nothing, the rig is central ({evidence})")
         }
@@ -94,13 +95,15 @@ pub fn central_model(found: &CentralModel) -> String {
                     short(difference.max_mm)
                 )
             });
-            format!(
-                "{points}change the evidence by {:+.0}",
-                -evidence_loss
-            )
+            format!("{points}change the evidence by {}", change(-evidence_loss))
         }
         CentralModel::NoEstimate => "not known: without offsets there is no estimate".to_owned(),
     }
+}
+
+/// A change of the evidence, without the sign of a negative zero.
+fn change(gain: f64) -> String {
+    format!("{:+.0}", gain.round() + 0.0)
 }
 
 /// What two halves of the poses say of each other.
@@ -123,7 +126,7 @@ fn judged(halves: &HalfData) -> String {
     if halves.is_larger() {
         format!("more than chance explains ({chance})")
     } else if halves.is_smaller() {
-        format!("less than predicted ({chance}), so the prediction is careful")
+        format!("less than predicted ({chance}): both err alike where smoothness decides")
     } else {
         format!("as predicted ({chance})")
     }
@@ -169,6 +172,7 @@ pub fn family(family: Family) -> String {
     match family {
         Family::Direction(degree) => format!("direction, degree {degree}"),
         Family::Spline => "direction, spline".to_owned(),
+        Family::Offset(OFFSET_CORE_DEGREE) => format!("offset, up to degree {OFFSET_CORE_DEGREE}"),
         Family::Offset(degree) => format!("offset, degree {degree}"),
     }
 }
