@@ -309,7 +309,7 @@ mod tests {
             assert!(page.contains(part), "{part} is not in the page");
         }
         assert_eq!(page.matches("<svg").count(), 9);
-        assert_eq!(page.matches("How to read this").count(), 6);
+        assert_eq!(page.matches("How to read this").count(), 8);
     }
 
     #[test]
