@@ -4,6 +4,7 @@
 //! that cannot be what they claim; the joint estimate adjusts everything and looks at the views
 //! once more; held-out boards and the calibration itself judge it; the record says all of it.
 
+mod left_out;
 mod summary;
 
 use crate::adjust::Observations;

@@ -34,11 +34,13 @@ fn halves_of(scene: &Scene, views: &[View]) -> HalfData {
     }
 }
 
+/// Noise draws per kind of optics.
+const SEEDS: u64 = 4;
+
 #[test]
 fn halves_differ_as_predicted() {
     for optics in [OpticsKind::Brown, OpticsKind::Port] {
         let (mut squares, mut variance) = (0.0, 0.0);
-        const SEEDS: u64 = 4;
         for seed in 1..=SEEDS {
             let scene = scene(optics, |s| s.seed = seed);
             let halves = halves_of(&scene, &scene.observe_corners());
@@ -185,4 +187,28 @@ fn a_central_rig_loses_nothing_by_being_central() {
             .iter()
             .all(|c| c.central && c.rms_mm == 0.0)
     );
+}
+
+#[test]
+#[ignore = "prints figures for BENCHMARKS.md and asserts none; takes minutes"]
+fn ratios_of_half_data_checks() {
+    for optics in [
+        OpticsKind::Brown,
+        OpticsKind::Port,
+        OpticsKind::Paper,
+        OpticsKind::Bumps,
+    ] {
+        let ratios: Vec<f64> = (1..=8)
+            .map(|seed| {
+                let scene = scene(optics, |s| s.seed = seed);
+                halves_of(&scene, &scene.observe_corners()).ratio
+            })
+            .collect();
+        let count = ratios.len() as f64;
+        let mean = ratios.iter().sum::<f64>() / count;
+        let rms = (ratios.iter().map(|r| r * r).sum::<f64>() / count).sqrt();
+        let least = ratios.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = ratios.iter().copied().fold(0.0, f64::max);
+        println!("{optics:?}: {least:.2} to {most:.2}, mean {mean:.3}, rms {rms:.3}");
+    }
 }

@@ -180,21 +180,8 @@ pub fn judge(figures: &Figures, thresholds: &Thresholds) -> Verdict {
         grade,
         format!("{} poses, {few} or more wanted", figures.pose_count),
     ));
-    for (name, share) in &figures.covered_share {
-        let grade = if *share >= thresholds.covered_share {
-            Grade::Pass
-        } else {
-            Grade::Doubtful
-        };
-        reasons.push((
-            grade,
-            format!(
-                "camera {name}: corners cover {:.0} % of the sensor, {:.0} % or more wanted",
-                100.0 * share,
-                100.0 * thresholds.covered_share
-            ),
-        ));
-    }
+    let cameras = figures.covered_share.iter();
+    reasons.extend(cameras.map(|(name, share)| coverage(name, *share, thresholds.covered_share)));
     if !figures.settled {
         reasons.push((
             Grade::Doubtful,
@@ -210,6 +197,20 @@ pub fn judge(figures: &Figures, thresholds: &Thresholds) -> Verdict {
             .map(|(grade, text)| format!("{grade}: {text}"))
             .collect(),
     }
+}
+
+fn coverage(camera: &str, share: f64, wanted: f64) -> (Grade, String) {
+    let grade = if share >= wanted {
+        Grade::Pass
+    } else {
+        Grade::Doubtful
+    };
+    let reason = format!(
+        "camera {camera}: corners cover {:.0} % of the sensor, {:.0} % or more wanted",
+        100.0 * share,
+        100.0 * wanted
+    );
+    (grade, reason)
 }
 
 #[cfg(test)]

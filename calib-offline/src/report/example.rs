@@ -70,24 +70,8 @@ pub fn calibration() -> Calibration {
     let cameras = rig_from_cameras
         .iter()
         .enumerate()
-        .map(|(camera_idx, (name, rig_from_camera))| CalibratedCamera {
-            name: (*name).to_owned(),
-            field: RayField::ideal(
-                SENSOR,
-                BaseLens {
-                    projection: Projection::Perspective,
-                    focal_px: FOCAL_PX,
-                },
-                3,
-            ),
-            coverage: CoverageMask::from_corners(
-                SENSOR,
-                corners
-                    .iter()
-                    .filter(|c| c.camera_idx == camera_idx)
-                    .map(|c| c.observed),
-            ),
-            rig_from_camera: *rig_from_camera,
+        .map(|(camera_idx, (name, rig_from_camera))| {
+            camera(camera_idx, name, *rig_from_camera, &corners)
         })
         .collect();
     Calibration {
@@ -126,6 +110,25 @@ pub fn calibration() -> Calibration {
                 "right: 79 % of the sensor is calibrated (limit 85 %)".to_owned(),
             ],
         },
+    }
+}
+
+fn camera(
+    camera_idx: usize,
+    name: &str,
+    rig_from_camera: RigidTransform,
+    corners: &[CornerRecord],
+) -> CalibratedCamera {
+    let base = BaseLens {
+        projection: Projection::Perspective,
+        focal_px: FOCAL_PX,
+    };
+    let own = corners.iter().filter(|c| c.camera_idx == camera_idx);
+    CalibratedCamera {
+        name: name.to_owned(),
+        field: RayField::ideal(SENSOR, base, 3),
+        coverage: CoverageMask::from_corners(SENSOR, own.map(|c| c.observed)),
+        rig_from_camera,
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::choices_page;
 use super::facts::Facts;
+use super::left_out_page;
 use super::plot::{Figure, cost, coverage, histogram, pose_rms, residual_vectors, scene};
 use super::record::Calibration;
 use super::text::short;
@@ -68,8 +69,7 @@ pub fn page(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
                     (headline(calibration, &facts, blob))
                     (figures(calibration))
                     (choices_page::draw(calibration))
-                    (left_out(calibration))
-                    (renumbered(calibration))
+                    (left_out_page::draw(calibration))
                     (provenance(calibration))
                 }
             }
@@ -193,54 +193,6 @@ fn group(title: &str, figures: &[Figure], how_to_read: &str) -> Markup {
                             @if figure.title != title { h3 { (figure.title) } }
                             (PreEscaped(&figure.svg))
                             figcaption { (figure.caption) }
-                        }
-                    }
-                }
-            }
-        }
-    }
-}
-
-fn left_out(calibration: &Calibration) -> Markup {
-    html! {
-        section {
-            h2 { "Left out" }
-            @if calibration.left_out.is_empty() {
-                p { "Nothing: every image was used." }
-            } @else {
-                div.scroll {
-                    table {
-                        thead { tr { th { "Pose" } th { "Camera" } th { "Corners" } th { "Reason" } } }
-                        tbody {
-                            @for left in &calibration.left_out {
-                                tr {
-                                    td.number { (left.pose) }
-                                    td { (left.camera.as_deref().unwrap_or("all")) }
-                                    td.number { (left.corner_count) }
-                                    td { (left.reason) }
-                                }
-                            }
-                        }
-                    }
-                }
-            }
-        }
-    }
-}
-
-fn renumbered(calibration: &Calibration) -> Markup {
-    html! {
-        @if !calibration.renumbered.is_empty() {
-            section {
-                h2 { "Renumbered" }
-                p.read { "These images are used, with their corners numbered from the other end of the board." }
-                div.scroll {
-                    table {
-                        thead { tr { th { "Pose" } th { "Camera" } th { "Reason" } } }
-                        tbody {
-                            @for view in &calibration.renumbered {
-                                tr { td.number { (view.pose) } td { (view.camera) } td { (view.reason) } }
-                            }
                         }
                     }
                 }

@@ -3,6 +3,7 @@
 pub mod choices_page;
 pub mod facts;
 pub mod html;
+pub mod left_out_page;
 pub mod plot;
 pub mod record;
 pub mod store;

@@ -45,7 +45,7 @@ pub fn camera_model(calibration: &Calibration, camera_idx: usize) -> Option<Stri
     let checks = calibration.checks.as_ref()?;
     let offset = offset_numbers(choices, camera_idx);
     let found = checks.centrality.get(camera_idx)?;
-    let mut words = match offset {
+    let rays = match offset {
         Some(numbers) if !found.central => format!(
             "non-central, {:.0} of {} offset numbers used, {}",
             numbers.effective,
@@ -54,13 +54,14 @@ pub fn camera_model(calibration: &Calibration, camera_idx: usize) -> Option<Stri
         ),
         _ => "central (0 mm by choice)".to_owned(),
     };
-    if let Some(numbers) = choices.numbers(camera_idx, |family| family == Family::Spline) {
-        words.push_str(&format!(
+    let spline = choices.numbers(camera_idx, |family| family == Family::Spline);
+    let spline = spline.map_or(String::new(), |numbers| {
+        format!(
             "; spline, {:.0} of {} numbers used",
             numbers.effective, numbers.all
-        ));
-    }
-    Some(words)
+        )
+    });
+    Some(rays + &spline)
 }
 
 fn centrality(found: &Centrality) -> String {
