@@ -1,7 +1,8 @@
 //! Two calibrations from two halves of the poses: do they differ as much as they say they may?
 //!
 //! Both halves triangulate the same exact pixels, so noise of the pixels has no part in it, and the
-//! rigid motion between the two rigs is taken out. What remains has a predicted covariance, the sum
+//! rigid motion between the two rigs is taken out. A camera alone measures no points; its rays
+//! are compared where they pass at the working distance. What remains has a predicted covariance, the sum
 //! of both halves' own. A ratio above what chance allows means that the estimate does not know how
 //! uncertain it is: errors that go together, a model that does not fit, a board or camera that
 //! moved. What both halves have in common cancels and is **not** seen: a wrong square size, a
@@ -13,10 +14,12 @@
 //! weak and 0.58 with strong local distortion; a focus that is 0.02 % longer in every other
 //! pose, which no residual shows, makes it 5.3.
 
-use super::working_volume::{Match, compare, matches_at};
-use crate::field::Rig;
+use super::working_volume::{Match, compare, lattice, matches_at};
+use crate::field::{RayField, Rig, transport};
+use crate::geometry::PixelPoint;
 use crate::joint::Estimate;
-use nalgebra::DMatrix;
+use crate::joint::point_covariance::{across_motions, without_motions};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -43,8 +46,6 @@ pub enum HalfDataCheck {
 pub enum Skipped {
     /// Nobody asked for it.
     NotWanted,
-    /// One camera measures no points.
-    OneCamera,
     /// Fewer poses than [`MIN_POSES`].
     TooFewPoses {
         /// How many there are.
@@ -63,9 +64,9 @@ pub enum Skipped {
 pub struct HalfData {
     /// Poses of each half.
     pub poses: [usize; 2],
-    /// Points compared, at the working distance.
+    /// Points compared, at the working distance; of a camera alone, rays where they pass there.
     pub points: usize,
-    /// RMS distance between the two halves' points, mm.
+    /// RMS distance between the two halves' points (or rays), mm.
     pub difference_rms_mm: f64,
     /// What it was to be by both halves' covariances, mm.
     pub predicted_rms_mm: f64,
@@ -89,6 +90,9 @@ impl HalfData {
         self.ratio < self.ratio_by_chance[0]
     }
 }
+
+/// Number of points or rays, RMS of their difference (mm) and its predicted covariance (mm^2).
+type Differing = (usize, f64, DMatrix<f64>);
 
 /// The two halves of some poses.
 #[derive(Debug)]
@@ -119,9 +123,6 @@ pub fn first_half(
 /// # Errors
 /// Why there are none.
 pub fn estimate_halves(estimate: &Estimate, first: &BTreeSet<usize>) -> Result<Halves, Skipped> {
-    if estimate.model.cameras.len() < 2 {
-        return Err(Skipped::OneCamera);
-    }
     if estimate.pose_count() < MIN_POSES {
         return Err(Skipped::TooFewPoses {
             have: estimate.pose_count(),
@@ -145,22 +146,20 @@ pub fn estimate_halves(estimate: &Estimate, first: &BTreeSet<usize>) -> Result<H
 }
 
 impl Halves {
-    /// Compares the points of both halves at a distance of the whole estimate's first camera.
+    /// Compares the points of both halves at a distance of the whole estimate's first camera; of a
+    /// camera alone, its rays.
     ///
     /// # Errors
     /// Why there is nothing to compare.
     pub fn compared(&mut self, whole: &Rig, distance_mm: f64) -> Result<HalfData, Skipped> {
-        let matches = matches_at(whole, &[distance_mm]);
-        let [rig_a, rig_b] = &self.rigs;
-        let compared = compare(rig_a, rig_b, &matches).ok_or(Skipped::NoCommonPoints)?;
-        let covariance = self
-            .predicted(&compared.matches, &compared.first_from_second.rotation)
-            .ok_or(Skipped::NoEstimate)?;
-        let points = compared.difference.points;
+        let (points, difference_rms_mm, covariance) = if whole.cameras.len() > 1 {
+            self.points(whole, distance_mm)?
+        } else {
+            self.rays(whole, distance_mm)?
+        };
         let total = covariance.trace();
         let modes = total * total / covariance.norm_squared();
         let predicted_rms_mm = (total / points as f64).sqrt();
-        let difference_rms_mm = compared.difference.rms_mm;
         let ratio = difference_rms_mm / predicted_rms_mm;
         if !ratio.is_finite() {
             return Err(Skipped::NoCommonPoints);
@@ -174,6 +173,45 @@ impl Halves {
             modes,
             ratio_by_chance: [-NORMAL_95, NORMAL_95].map(|z| ratio_quantile(modes, z)),
         })
+    }
+
+    /// Number of points compared, RMS of their difference, and its covariance.
+    fn points(&mut self, whole: &Rig, distance_mm: f64) -> Result<Differing, Skipped> {
+        let matches = matches_at(whole, &[distance_mm]);
+        let [rig_a, rig_b] = &self.rigs;
+        let compared = compare(rig_a, rig_b, &matches).ok_or(Skipped::NoCommonPoints)?;
+        let covariance = self
+            .predicted(&compared.matches, &compared.first_from_second.rotation)
+            .ok_or(Skipped::NoEstimate)?;
+        let difference = compared.difference;
+        Ok((difference.points, difference.rms_mm, covariance))
+    }
+
+    /// The same of the first camera's rays.
+    fn rays(&mut self, whole: &Rig, distance_mm: f64) -> Result<Differing, Skipped> {
+        let [rig_a, rig_b] = &self.rigs;
+        let cameras = (
+            whole.cameras.first(),
+            rig_a.cameras.first(),
+            rig_b.cameras.first(),
+        );
+        let (Some(camera), Some(a), Some(b)) = cameras else {
+            return Err(Skipped::NoCommonPoints);
+        };
+        let both = |pixel: &PixelPoint| a.coverage.contains(*pixel) && b.coverage.contains(*pixel);
+        let mut pixels = lattice(&camera.coverage, 1.0);
+        pixels.retain(both);
+        let apart = rays_apart(&a.field, &b.field, &pixels, distance_mm);
+        let apart = apart.ok_or(Skipped::NoCommonPoints)?;
+        let [estimate_a, estimate_b] = &mut self.estimates;
+        // Both covariances are along the axes across the same rays, whatever the rigs' frames.
+        let own = estimate_a.ray_covariance(rig_a, 0, &pixels, distance_mm);
+        let other = estimate_b.ray_covariance(rig_b, 0, &pixels, distance_mm);
+        let (Ok(Some(own)), Ok(Some(other))) = (own, other) else {
+            return Err(Skipped::NoEstimate);
+        };
+        let rms_mm = (apart.norm_squared() / pixels.len() as f64).sqrt();
+        Ok((pixels.len(), rms_mm, own + other))
     }
 
     /// Covariance of the difference, in the first half's frame.
@@ -195,6 +233,30 @@ impl Halves {
         }
         Some(sum)
     }
+}
+
+/// How far the second field's rays pass from points on the first's, along the axes across the
+/// rays, the best rigid motion of the camera taken out, mm; `None` of too few pixels.
+fn rays_apart(
+    first: &RayField,
+    second: &RayField,
+    pixels: &[PixelPoint],
+    distance_mm: f64,
+) -> Option<DVector<f64>> {
+    let mut apart = DVector::zeros(2 * pixels.len());
+    let mut motions = DMatrix::zeros(2 * pixels.len(), 6);
+    for (k, pixel) in pixels.iter().enumerate() {
+        let ray = first.ray(*pixel);
+        let point = ray.origin_mm + ray.direction.normalize() * distance_mm;
+        let sample = second.sample(*pixel);
+        let axes = transport::across(&sample.s);
+        apart
+            .fixed_rows_mut::<2>(2 * k)
+            .copy_from(&(axes.tr_mul(&point) - sample.m_mm));
+        let across = across_motions(&axes, &point);
+        motions.view_mut((2 * k, 0), (2, 6)).copy_from(&across);
+    }
+    Some(without_motions(&motions)? * apart)
 }
 
 /// Quantile of the ratio of an RMS to its expectation at `z` standard deviations, for a sum of

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, Matrix2, Matrix3x2, Matrix4, Vector3};
 /// Nodes of a grid along the longer side of the sensor.
 const NODES_ALONG_LONGER_SIDE: usize = 11;
 /// Singular values below this count as zero: a rigid motion that moves no point (mm per rad or mm).
-const RIGID_RANK_SHARE: f64 = 1e-9;
+pub(super) const RIGID_RANK_SHARE: f64 = 1e-9;
 
 impl Estimate {
     /// Fills in how well the pairs of a rig (made by [`Estimate::rig`]) know their rays (METHOD 5).
@@ -91,9 +91,9 @@ pub(super) struct Node {
     /// Rig frame.
     ray: Ray,
     /// The two axes across the ray, rig frame.
-    axes: Matrix3x2<f64>,
+    pub(super) axes: Matrix3x2<f64>,
     /// Shift of the ray along its axes, at the point, per px.
-    mm_per_px: Matrix2<f64>,
+    pub(super) mm_per_px: Matrix2<f64>,
     /// Distance of the point along the ray, mm.
     distance_mm: f64,
     /// Whether it is the nearest measured place, in place of a node that is not measured.

@@ -136,7 +136,6 @@ fn judged(halves: &HalfData) -> String {
 fn skipped(reason: Skipped) -> String {
     match reason {
         Skipped::NotWanted => "not asked for".to_owned(),
-        Skipped::OneCamera => "one camera alone measures no points".to_owned(),
         Skipped::TooFewPoses { have, need } => {
             format!("{have} poses, {need} or more are needed to halve them")
         }
