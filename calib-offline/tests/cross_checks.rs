@@ -94,20 +94,26 @@ fn few_poses_are_not_halved() {
     );
 }
 
+fn halves_of_one_camera(seed: u64) -> HalfData {
+    let mut scene = scene(OpticsKind::Brown, |s| s.seed = seed);
+    let mut views = scene.observe_corners();
+    views.retain(|view| view.camera_idx == 0);
+    scene.cameras.truncate(1);
+    let (estimate, _) = run_views(&scene, &views);
+    let poses = estimate.observations.poses.iter().copied();
+    let first = first_half(poses, |pose| scene.pose_placements.get(pose).copied());
+    let checks = cross_check(&estimate, &estimate.rig(&names()[..1]), Some(&first));
+    match checks.half_data {
+        HalfDataCheck::Compared(halves) => halves,
+        HalfDataCheck::Skipped(reason) => panic!("{reason:?}"),
+    }
+}
+
 #[test]
 fn rays_of_a_camera_alone_differ_as_predicted() {
     let (mut squares, mut variance) = (0.0, 0.0);
     for seed in 1..=SEEDS {
-        let mut scene = scene(OpticsKind::Brown, |s| s.seed = seed);
-        let mut views = scene.observe_corners();
-        views.retain(|view| view.camera_idx == 0);
-        scene.cameras.truncate(1);
-        let (estimate, _) = run_views(&scene, &views);
-        let first = first_half(0..34, |pose| Some(scene.pose_placements[pose]));
-        let checks = cross_check(&estimate, &estimate.rig(&names()[..1]), Some(&first));
-        let HalfDataCheck::Compared(halves) = checks.half_data else {
-            panic!("{:?}", checks.half_data);
-        };
+        let halves = halves_of_one_camera(seed);
         squares += halves.ratio.powi(2) / SEEDS as f64;
         variance += 2.0 / halves.modes / (SEEDS * SEEDS) as f64;
     }
@@ -209,23 +215,25 @@ fn a_central_rig_loses_nothing_by_being_central() {
 #[test]
 #[ignore = "prints figures for BENCHMARKS.md and asserts none; takes minutes"]
 fn ratios_of_half_data_checks() {
-    for optics in [
-        OpticsKind::Brown,
-        OpticsKind::Port,
-        OpticsKind::Paper,
-        OpticsKind::Bumps,
-    ] {
-        let ratios: Vec<f64> = (1..=8)
-            .map(|seed| {
-                let scene = scene(optics, |s| s.seed = seed);
-                halves_of(&scene, &scene.observe_corners()).ratio
-            })
-            .collect();
+    let print = |what: &str, of_seed: &dyn Fn(u64) -> HalfData| {
+        let ratios: Vec<f64> = (1..=8).map(|seed| of_seed(seed).ratio).collect();
         let count = ratios.len() as f64;
         let mean = ratios.iter().sum::<f64>() / count;
         let rms = (ratios.iter().map(|r| r * r).sum::<f64>() / count).sqrt();
         let least = ratios.iter().copied().fold(f64::INFINITY, f64::min);
         let most = ratios.iter().copied().fold(0.0, f64::max);
-        println!("{optics:?}: {least:.2} to {most:.2}, mean {mean:.3}, rms {rms:.3}");
+        println!("{what}: {least:.2} to {most:.2}, mean {mean:.3}, rms {rms:.3}");
+    };
+    for (what, optics) in [
+        ("brown", OpticsKind::Brown),
+        ("port", OpticsKind::Port),
+        ("paper", OpticsKind::Paper),
+        ("bumps", OpticsKind::Bumps),
+    ] {
+        print(what, &|seed| {
+            let scene = scene(optics, |s| s.seed = seed);
+            halves_of(&scene, &scene.observe_corners())
+        });
     }
+    print("brown, one camera", &halves_of_one_camera);
 }
