@@ -165,7 +165,8 @@ fn held_out_record(held_out: &HeldOut) -> Option<HeldOutRecord> {
     lengths.sort_by(f64::total_cmp);
     Some(HeldOutRecord {
         folds: held_out.folds,
-        failed_folds: held_out.failed_folds,
+        failed_folds: held_out.failed.len(),
+        fold_failures: held_out.failed.clone(),
         rms_px: rms(&lengths),
         median_px: lengths.get(lengths.len() / 2).copied(),
         neighbor_rms_percent: rms(&held_out.boards.neighbor_errors).map(|e| 100.0 * e),

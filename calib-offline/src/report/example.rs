@@ -150,6 +150,7 @@ fn held_out() -> HeldOutRecord {
     HeldOutRecord {
         folds: 5,
         failed_folds: 0,
+        fold_failures: Vec::new(),
         rms_px: Some(0.0741),
         median_px: Some(0.0602),
         neighbor_rms_percent: Some(0.152),
@@ -199,7 +200,7 @@ fn checks() -> CrossChecks {
         centrality: cameras
             .map(|(rms_mm, max_mm, halves_rms_mm)| Centrality {
                 central: rms_mm == 0.0,
-                point_in_camera_mm: Vector3::new(0.0, 0.0, -20.0 * rms_mm),
+                point_in_camera_mm: Vector3::new(0.0, 0.0, 20.0 * rms_mm),
                 rms_mm,
                 max_mm,
                 halves_rms_mm,

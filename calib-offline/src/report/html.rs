@@ -4,7 +4,7 @@ use super::choices_page;
 use super::facts::Facts;
 use super::left_out_page;
 use super::plot::{Figure, cost, coverage, histogram, pose_rms, residual_vectors, scene};
-use super::record::Calibration;
+use super::record::{Calibration, HeldOutRecord};
 use super::text::short;
 use super::words;
 use crate::evaluate::half_data::HalfDataCheck;
@@ -119,7 +119,7 @@ fn headline(calibration: &Calibration, facts: &Facts, blob: Option<&BlobFacts>) 
                 (card("Held-out residual", &px(value), "RMS residual vector, board pose refitted"))
             }
             @if let Some(held_out) = held_out {
-                (card("Held-out check", &format!("{} folds", held_out.folds), &format!("by pose; {} points, {} outside the calibrated area", held_out.point_count, held_out.outside_count)))
+                (card("Held-out check", &format!("{} folds", held_out.folds), &format!("by pose; {} points, {} outside the calibrated area{}", held_out.point_count, held_out.outside_count, failed_folds(held_out))))
             } @else {
                 (card("Held-out check", "none", "too few poses to leave some out"))
             }
@@ -153,6 +153,13 @@ fn headline(calibration: &Calibration, facts: &Facts, blob: Option<&BlobFacts>) 
             }
         }
     }
+}
+
+fn failed_folds(held_out: &HeldOutRecord) -> String {
+    let failures = held_out.fold_failures.iter();
+    failures.fold(String::new(), |text, failed| {
+        text + &format!("; fold {} gave no estimate: {}", failed.fold, failed.reason)
+    })
 }
 
 fn share_rejected(facts: &Facts) -> String {

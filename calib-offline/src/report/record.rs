@@ -3,6 +3,7 @@
 pub use crate::board::BoardShape;
 use crate::board::BoardSpec;
 pub use crate::evaluate::CrossChecks;
+pub use crate::evaluate::held_out::FailedFold;
 pub use crate::evaluate::verdict::{Grade, Verdict};
 use crate::field::Rig;
 use crate::geometry::{PixelPoint, RigidTransform};
@@ -180,6 +181,9 @@ pub struct HeldOutRecord {
     /// Folds whose other poses gave no estimate; nothing is known of their boards.
     #[serde(default)]
     pub failed_folds: usize,
+    /// Which, and why.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fold_failures: Vec<FailedFold>,
     /// RMS residual vector of the held-out corners, board pose refitted, px.
     pub rms_px: Option<f64>,
     /// Median of the same.

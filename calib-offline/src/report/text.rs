@@ -124,7 +124,11 @@ fn held_out(calibration: &Calibration, facts: &Facts) -> String {
     }
     let failed = match held_out.failed_folds {
         0 => String::new(),
-        count => format!("; {count} more gave no estimate"),
+        count => {
+            let first = held_out.fold_failures.first();
+            let reason = first.map_or(String::new(), |failed| format!(": {}", failed.reason));
+            format!("; {count} more gave no estimate{reason}")
+        }
     };
     format!(
         "{} (RMS, {} folds by pose{failed})",
@@ -151,6 +155,7 @@ pub fn short(value: f64) -> String {
 mod tests {
     use super::*;
     use crate::report::example;
+    use crate::report::record::FailedFold;
 
     #[test]
     fn three_digits_are_shown_at_any_size() {
@@ -193,6 +198,15 @@ mod tests {
         ] {
             assert!(text.contains(part), "{part:?} is not in:\n{text}");
         }
+        if let Some(held_out) = &mut calibration.held_out {
+            held_out.failed_folds = 1;
+            held_out.fold_failures = vec![FailedFold {
+                fold: 3,
+                reason: "too dark".to_owned(),
+            }];
+        }
+        let text = summary(&calibration, None);
+        assert!(text.contains("5 folds by pose; 1 more gave no estimate: too dark)"));
         calibration.held_out = None;
         assert!(summary(&calibration, None).contains("not checked"));
     }

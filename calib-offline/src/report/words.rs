@@ -127,7 +127,7 @@ fn judged(halves: &HalfData) -> String {
     if halves.is_larger() {
         format!("more than chance explains ({chance})")
     } else if halves.is_smaller() {
-        format!("less than predicted ({chance}): both err alike where smoothness decides")
+        format!("less than predicted ({chance}): a careful prediction, or both err alike")
     } else {
         format!("as predicted ({chance})")
     }
