@@ -2,21 +2,23 @@
 //!
 //! A dataset's corners become observations; initialization finds lenses and poses, and the views
 //! that cannot be what they claim; the joint estimate adjusts everything and looks at the views
-//! once more; held-out boards judge it; the record says all of it.
+//! once more; held-out boards and the calibration itself judge it; the record says all of it.
 
+mod left_out;
 mod summary;
 
 use crate::adjust::Observations;
-use crate::dataset::corners::load_corners;
+use crate::dataset::corners::{load_corners, poses};
 use crate::dataset::split::without_excluded;
 use crate::dataset::sufficiency::{SufficiencyError, check_sufficiency};
-use crate::dataset::{Dataset, View};
+use crate::dataset::{Dataset, View, stage};
 use crate::detect::suspicion::suspicious_labels;
 use crate::detect::verdict::Outcome;
 use crate::detect::{self, DetectSettings};
 use crate::error::{Error, UsageError};
+use crate::evaluate::half_data::first_half;
 use crate::evaluate::verdict::Thresholds;
-use crate::evaluate::{Folds, estimate_folds, held_out};
+use crate::evaluate::{Folds, cross_check, estimate_folds, held_out};
 use crate::init::rig::start_rig;
 use crate::joint::estimate_screened;
 use crate::progress::Progress;
@@ -48,7 +50,7 @@ impl Method {
 pub struct CalibrateSettings {
     /// Which estimate.
     pub method: Method,
-    /// Folds of the held-out check; 0 leaves it out.
+    /// Folds of the held-out check; 0 leaves it out, and the comparison of two halves with it.
     pub folds: usize,
     /// What counts as good.
     pub thresholds: Thresholds,
@@ -168,14 +170,23 @@ pub fn calibrate_corners(
     estimate.fill_uncertainty(&mut rig)?;
     progress.end();
 
-    let folds = if estimate.pose_count() >= 2 * crate::dataset::sufficiency::MIN_POSES {
-        progress.begin("check on held-out poses", settings.folds);
-        let folds = estimate_folds(&estimate.observations, settings.folds, progress);
-        progress.end();
-        folds
+    let board_peak_to_valley_mm = estimate.board_peak_to_valley_mm()?;
+
+    let wanted = if estimate.pose_count() >= 2 * crate::dataset::sufficiency::MIN_POSES {
+        settings.folds
     } else {
-        Folds::default()
+        0
     };
+    let all_poses = poses(&corners.views);
+    let placement = |pose| stage::entry(dataset, &all_poses, pose).placement;
+    let half = first_half(estimate.observations.poses.iter().copied(), placement);
+    let half = (settings.folds > 0).then_some(&half);
+    progress.begin("cross-checks", wanted);
+    let (folds, checks) = rayon::join(
+        || estimate_folds(&estimate.observations, wanted, progress),
+        || cross_check(&estimate, &rig, half),
+    );
+    progress.end();
     let calibration = summary::record(&summary::Parts {
         dataset,
         corners,
@@ -183,7 +194,9 @@ pub fn calibrate_corners(
         estimate: &estimate,
         rig,
         findings: &findings,
+        board_peak_to_valley_mm,
         held_out: &held_out(&folds),
+        checks,
         thresholds: &settings.thresholds,
     });
     Ok(Checked {

@@ -26,10 +26,13 @@ DATASET is a folder with dataset.toml and corners.csv or images; corners win. Th
 made if need be and then holds calibration.json (every number), rig.rays (the blob for the device)
 and report.html. Results that stand there already are replaced only with --force.
 
-With --json: schema calib-offline/calibrate/1, verdict, reasons, held_out_*, rms_px, sigma_px,
-cameras, baseline_mm, working_distance_mm, counts of poses, views and corners, left_out, blob (bytes,
-max_error_px, wanted_error_px: larger than wanted only where f32 cannot say it better), calibration,
-rig, report (the three files).";
+With --json: schema calib-offline/calibrate/1, verdict, reasons, held_out_*, half_data_mm and
+half_data_ratio (points of two calibrations from half of the poses: RMS difference, and over what was
+predicted), central_model_mm (RMS by which a central model would move points; 0 for a central rig),
+rms_px, sigma_px, cameras (name, sensor_px, covered_share, views, central, centrality_rms_mm,
+offset_numbers: used and all), baseline_mm, working_distance_mm, counts of poses, views and corners,
+left_out, blob (bytes, max_error_px, wanted_error_px: larger than wanted only where f32 cannot say it
+better), calibration, rig, report (the three files). A figure that does not apply is null.";
 
 /// The blob's bound unless `pack` is asked for another, px: well below the noise of any corner.
 pub const BLOB_MAX_ERROR_PX: f64 = 0.001;

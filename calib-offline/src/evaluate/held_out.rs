@@ -11,13 +11,15 @@ use crate::adjust::observations::ViewBlock;
 use crate::dataset::Corner;
 use crate::field::Rig;
 use crate::geometry::PixelPoint;
+use crate::init::InitError;
 use crate::init::rig::start_rig;
-use crate::joint::{Estimate, estimate};
+use crate::joint::{Estimate, EstimateError, estimate};
 use crate::matches::source::{PointSource, RigSource};
 use crate::matches::{Number, Sighting, Status};
 use crate::progress::Progress;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// An estimate from all poses but those of one fold.
 #[derive(Debug, Clone)]
@@ -33,8 +35,26 @@ pub struct Fold {
 pub struct Folds {
     /// In order; those whose training poses gave no estimate are not in it.
     pub estimated: Vec<Fold>,
-    /// How many gave none.
-    pub failed: usize,
+    /// Those that gave none, in order.
+    pub failed: Vec<FailedFold>,
+}
+
+/// A fold whose training poses gave no estimate.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FailedFold {
+    /// Its number, from 0.
+    pub fold: usize,
+    /// Why, in words.
+    pub reason: String,
+}
+
+/// Why a fold's training poses gave no estimate.
+#[derive(Debug, thiserror::Error)]
+enum FoldError {
+    #[error(transparent)]
+    Start(#[from] InitError),
+    #[error(transparent)]
+    Estimate(#[from] EstimateError),
 }
 
 /// Errors on held-out boards, all folds together.
@@ -49,7 +69,7 @@ pub struct HeldOut {
     /// The triangulated boards.
     pub boards: BoardErrors,
     /// Folds whose training poses gave no estimate.
-    pub failed_folds: usize,
+    pub failed: Vec<FailedFold>,
 }
 
 /// Errors of triangulated boards.
@@ -90,21 +110,32 @@ pub fn fold_of(pose_idx: usize, folds: usize) -> usize {
 ///
 /// Cost: `folds` estimates, run in parallel with ordered results.
 pub fn estimate_folds(observations: &Observations, folds: usize, progress: &dyn Progress) -> Folds {
-    let estimated: Vec<Fold> = (0..folds)
+    let results: Vec<Result<Fold, FailedFold>> = (0..folds)
         .into_par_iter()
-        .filter_map(|fold| {
+        .map(|fold| {
             let result = estimate_fold(observations, folds, fold);
             progress.advance();
-            result
+            result.map_err(|error| FailedFold {
+                fold,
+                reason: error.to_string(),
+            })
         })
         .collect();
-    Folds {
-        failed: folds - estimated.len(),
-        estimated,
+    let mut all = Folds::default();
+    for result in results {
+        match result {
+            Ok(fold) => all.estimated.push(fold),
+            Err(failed) => all.failed.push(failed),
+        }
     }
+    all
 }
 
-fn estimate_fold(observations: &Observations, folds: usize, fold: usize) -> Option<Fold> {
+fn estimate_fold(
+    observations: &Observations,
+    folds: usize,
+    fold: usize,
+) -> Result<Fold, FoldError> {
     let in_fold = |pose: usize| {
         observations
             .poses
@@ -112,9 +143,9 @@ fn estimate_fold(observations: &Observations, folds: usize, fold: usize) -> Opti
             .is_ok_and(|idx| fold_of(idx, folds) == fold)
     };
     let training = observations.with_poses(|pose| !in_fold(pose));
-    let start = start_rig(&training).ok()?;
-    Some(Fold {
-        estimate: estimate(&start.observations, &start).ok()?,
+    let start = start_rig(&training)?;
+    Ok(Fold {
+        estimate: estimate(&start.observations, &start)?,
         unseen: observations.with_poses(in_fold),
     })
 }
@@ -123,7 +154,7 @@ fn estimate_fold(observations: &Observations, folds: usize, fold: usize) -> Opti
 pub fn held_out(folds: &Folds) -> HeldOut {
     let mut all = HeldOut {
         folds: folds.estimated.len(),
-        failed_folds: folds.failed,
+        failed: folds.failed.clone(),
         ..HeldOut::default()
     };
     for fold in &folds.estimated {

@@ -2,13 +2,19 @@
 //! it, on boards that it never saw, in millimeters and in pixels.
 
 pub mod capture;
+pub mod central_model;
+pub mod centrality;
+pub mod cross_checks;
+pub mod half_data;
 pub mod held_out;
 pub mod measured_board;
 pub mod resection;
 pub mod stage_axis;
 pub mod truth;
 pub mod verdict;
+pub mod working_volume;
 
 pub use capture::Capture;
+pub use cross_checks::{CrossChecks, cross_check};
 pub use held_out::{Folds, HeldOut, estimate_folds, held_out};
 pub use stage_axis::fit_stage_axes;

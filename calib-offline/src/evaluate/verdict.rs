@@ -43,6 +43,10 @@ pub struct Thresholds {
     pub held_out_ratio: (f64, f64),
     /// RMS error of neighboring corners' distance on held-out boards, percent of the square.
     pub neighbor_rms_percent: (f64, f64),
+    /// Difference of two calibrations from half of the poses over what it was to be; above it the
+    /// calibration is doubtful. Chance alone leads to 1.5 (see `half_data`); at twice the
+    /// prediction the predicted uncertainty is worth little.
+    pub half_data_ratio: f64,
     /// Share of corners rejected as outliers.
     pub rejected_share: (f64, f64),
     /// Share of views that had to be left out, split from their pair or renumbered; above it,
@@ -61,6 +65,7 @@ impl Default for Thresholds {
             sigma_px: (0.3, 2.0),
             held_out_ratio: (1.5, 5.0),
             neighbor_rms_percent: (1.0, 10.0),
+            half_data_ratio: 2.0,
             rejected_share: (0.03, 0.3),
             suspect_views: 0.03,
             poses: (10, 3),
@@ -80,6 +85,8 @@ pub struct Figures {
     pub held_out_rms_px: Option<f64>,
     /// RMS error of neighboring corners' distance on held-out boards, percent.
     pub neighbor_rms_percent: Option<f64>,
+    /// Difference of two calibrations from half of the poses over what it was to be.
+    pub half_data_ratio: Option<f64>,
     /// Corners used and rejected.
     pub corners: (usize, usize),
     /// Views that could not be used as they were recorded, and all views.
@@ -128,6 +135,14 @@ pub fn judge(figures: &Figures, thresholds: &Thresholds) -> Verdict {
             thresholds.neighbor_rms_percent,
         );
     }
+    if let Some(ratio) = figures.half_data_ratio {
+        above(
+            "difference of half-data calibrations over the predicted one",
+            ratio,
+            "",
+            (thresholds.half_data_ratio, f64::INFINITY),
+        );
+    }
     let (used, rejected) = figures.corners;
     above(
         "share of corners rejected",
@@ -165,21 +180,8 @@ pub fn judge(figures: &Figures, thresholds: &Thresholds) -> Verdict {
         grade,
         format!("{} poses, {few} or more wanted", figures.pose_count),
     ));
-    for (name, share) in &figures.covered_share {
-        let grade = if *share >= thresholds.covered_share {
-            Grade::Pass
-        } else {
-            Grade::Doubtful
-        };
-        reasons.push((
-            grade,
-            format!(
-                "camera {name}: corners cover {:.0} % of the sensor, {:.0} % or more wanted",
-                100.0 * share,
-                100.0 * thresholds.covered_share
-            ),
-        ));
-    }
+    let cameras = figures.covered_share.iter();
+    reasons.extend(cameras.map(|(name, share)| coverage(name, *share, thresholds.covered_share)));
     if !figures.settled {
         reasons.push((
             Grade::Doubtful,
@@ -197,6 +199,20 @@ pub fn judge(figures: &Figures, thresholds: &Thresholds) -> Verdict {
     }
 }
 
+fn coverage(camera: &str, share: f64, wanted: f64) -> (Grade, String) {
+    let grade = if share >= wanted {
+        Grade::Pass
+    } else {
+        Grade::Doubtful
+    };
+    let reason = format!(
+        "camera {camera}: corners cover {:.0} % of the sensor, {:.0} % or more wanted",
+        100.0 * share,
+        100.0 * wanted
+    );
+    (grade, reason)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -207,6 +223,7 @@ mod tests {
             rms_px: 0.07,
             held_out_rms_px: Some(0.072),
             neighbor_rms_percent: Some(0.1),
+            half_data_ratio: Some(1.3),
             corners: (5000, 10),
             suspect_views: (1, 68),
             pose_count: 34,
@@ -222,7 +239,8 @@ mod tests {
     fn good_figures_pass_and_each_bad_one_lowers_the_grade() {
         let thresholds = Thresholds::default();
         assert_eq!(judge(&good(), &thresholds).grade, Grade::Pass);
-        let cases: [(Spoil, Grade); 7] = [
+        let cases: [(Spoil, Grade); 8] = [
+            (|f| f.half_data_ratio = Some(2.5), Grade::Doubtful),
             (|f| f.suspect_views = (11, 68), Grade::Doubtful),
             (|f| f.sigma_px = 0.4, Grade::Doubtful),
             (|f| f.sigma_px = f64::NAN, Grade::Fail),

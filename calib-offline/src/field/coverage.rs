@@ -70,6 +70,20 @@ impl CoverageMask {
         self.covered[j * self.cells_u + i]
     }
 
+    /// Middles of the calibrated cells, row by row.
+    pub fn covered_middles(&self) -> Vec<PixelPoint> {
+        let (width_px, height_px) = self.cell_size_px();
+        (0..self.cells_u * self.cells_v)
+            .filter(|cell| self.covered[*cell])
+            .map(|cell| {
+                PixelPoint::new(
+                    ((cell % self.cells_u) as f64 + 0.5) * width_px - 0.5,
+                    ((cell / self.cells_u) as f64 + 0.5) * height_px - 0.5,
+                )
+            })
+            .collect()
+    }
+
     /// Share of the sensor that is calibrated, 0 to 1.
     pub fn covered_share(&self) -> f64 {
         self.covered.iter().filter(|c| **c).count() as f64 / self.covered.len() as f64

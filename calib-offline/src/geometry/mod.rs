@@ -13,5 +13,6 @@ pub use pixel::{PixelPoint, SensorSize};
 pub use ray::Ray;
 pub use se3::RigidTransform;
 pub use triangulation::{
-    TriangulateError, Triangulation, midpoint_by_shifts, triangulate_pair, triangulate_rays,
+    TriangulateError, Triangulation, midpoint_by_shifts, nearest_point, triangulate_pair,
+    triangulate_rays,
 };

@@ -82,6 +82,20 @@ pub fn midpoint_by_shifts(a: &Ray, b: &Ray) -> Option<(Matrix3<f64>, Matrix3<f64
     Some((by_shift(&d1, &d2), by_shift(&d2, &d1)))
 }
 
+/// The point with the least sum of squared distances from rays taken as whole lines, before or
+/// behind their origins, mm; `None` if all are parallel or there are none.
+pub fn nearest_point(rays: &[Ray]) -> Option<Vector3<f64>> {
+    let mut normal = Matrix3::zeros();
+    let mut right = Vector3::zeros();
+    for ray in rays {
+        let d = ray.direction.normalize();
+        let projector = Matrix3::identity() - d * d.transpose();
+        normal += projector;
+        right += projector * ray.origin_mm;
+    }
+    normal.try_inverse().map(|inverse| inverse * right)
+}
+
 /// The point nearest to any number of rays in the least-squares sense.
 ///
 /// Two rays give exactly [`triangulate_pair`]'s point up to round-off.
@@ -108,18 +122,7 @@ pub fn triangulate_rays(rays: &[Ray]) -> Result<Triangulation, TriangulateError>
     if !(widest > MIN_PARALLAX_SIN * MIN_PARALLAX_SIN) {
         return Err(TriangulateError::Parallel);
     }
-    let mut normal = Matrix3::zeros();
-    let mut right = Vector3::zeros();
-    for ray in rays {
-        let d = ray.direction.normalize();
-        let projector = Matrix3::identity() - d * d.transpose();
-        normal += projector;
-        right += projector * ray.origin_mm;
-    }
-    let point_mm = normal
-        .try_inverse()
-        .map(|inverse| inverse * right)
-        .ok_or(TriangulateError::Parallel)?;
+    let point_mm = nearest_point(rays).ok_or(TriangulateError::Parallel)?;
     let mut distance_squared = 0.0;
     for ray in rays {
         if !((point_mm - ray.origin_mm).dot(&ray.direction) > 0.0) {

@@ -3,6 +3,7 @@
 use super::Estimate;
 use crate::field::{CalibratedCamera, CoverageMask, Rig};
 use crate::geometry::RigidTransform;
+use nalgebra::Vector3;
 
 impl Estimate {
     /// The calibrated rig. The datum is the first pose used; the calibrated area of a camera is
@@ -44,6 +45,21 @@ impl Estimate {
             .iter()
             .map(|pose| datum * *pose)
             .collect()
+    }
+
+    /// Distances from the first camera to the middles of the boards, mm, rising. `rig` is that of
+    /// [`Self::rig`].
+    pub fn board_distances_mm(&self, rig: &Rig) -> Vec<f64> {
+        let center_in_board = self.observations.board.center_in_board();
+        let camera = rig.cameras.first().map(|camera| camera.rig_from_camera);
+        let place = camera.map_or_else(Vector3::zeros, |camera| camera.translation_mm);
+        let mut distances: Vec<f64> = self
+            .rig_from_board()
+            .iter()
+            .map(|pose| (pose.point(&center_in_board) - place).norm())
+            .collect();
+        distances.sort_by(f64::total_cmp);
+        distances
     }
 
     fn datum_from_first_camera(&self) -> RigidTransform {

@@ -6,6 +6,7 @@ use super::fit::Fit;
 use super::rebase::rebase;
 use crate::adjust::{Model, Observations};
 use crate::field::spline::{Spline, SplineGrid};
+use serde::{Deserialize, Serialize};
 
 /// Spacing of a first spline, in cells along the sensor's longer side: 56 px on 1280 px.
 const FIRST_CELLS: f64 = 23.0;
@@ -24,19 +25,44 @@ const HOPELESS_GAP: f64 = 100.0;
 const HOPELESS_CHANGES: f64 = 10.0;
 /// Twice the log evidence that a more flexible model must gain: "positive" on the scale of Kass
 /// and Raftery (1995). Ties go to the simpler model.
-const NEEDED_GAIN: f64 = 4.0;
+pub const NEEDED_GAIN: f64 = 4.0;
 
 /// How often the base lenses are fitted anew at this stage, at most.
 const MOST_REBASES: usize = 3;
 
+/// A change of the model that was best until then.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Alternative {
+    /// Every camera gets an offset: its rays need not meet in one point.
+    Offsets,
+    /// The same, and the splines go.
+    OffsetsForSpline,
+    /// The lenses underneath are fitted anew, as offsets explain part of what they did.
+    Lenses,
+    /// Every camera's direction gets a spline, or one of another spacing.
+    Spline {
+        /// Cells along the sensor's longer side.
+        cells: f64,
+    },
+    /// One camera loses its offset.
+    Central {
+        /// Index of the camera.
+        camera_idx: usize,
+    },
+    /// All cameras lose their splines.
+    NoSpline,
+}
+
 /// An alternative that was tried.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Choice {
-    /// In words.
-    pub what: String,
-    /// Twice its log evidence minus that of the model that was best until then; minus infinity if
-    /// the data leave a parameter of it open, and only roughly so if it is far behind.
-    pub gain: f64,
+    /// What it changes.
+    pub tried: Alternative,
+    /// Twice its log evidence minus that of the model that was best until then; `None` if the data
+    /// leave a parameter of it open, and only roughly so if it is far behind.
+    pub gain: Option<f64>,
     /// Whether it was taken.
     pub taken: bool,
 }
@@ -122,68 +148,54 @@ impl Search<'_> {
     /// of what it does, so whichever explains more goes first.
     fn structure(&mut self) {
         let bare = self.best.clone();
-        let spline_taken = self.spline(FIRST_CELLS);
-        if !spline_taken {
+        if !self.spline(FIRST_CELLS) {
             if self.offsets() {
                 self.lenses();
                 self.spline(FIRST_CELLS);
             }
             return;
         }
-        // The offsets without the spline against the spline without them.
         let splined = std::mem::replace(&mut self.best, bare);
-        let changed = self.best.fit.changed(self.observations, add_offsets);
-        let rival = splined.evidence;
-        let offsets = Candidate::settle(changed, rival, self.observations).ok();
-        match offsets {
-            Some(offsets) if offsets.evidence > rival => {
-                self.tried.push(Choice {
-                    what: "offsets of all cameras in place of the spline".to_string(),
-                    gain: offsets.evidence - rival,
-                    taken: true,
-                });
-                self.best = offsets;
+        if self.offsets_beyond(splined.evidence) {
+            self.lenses();
+            self.spline(FIRST_CELLS);
+        } else {
+            self.best = splined;
+            if self.offsets() && self.drop_spline() {
                 self.lenses();
-                self.spline(FIRST_CELLS);
-            }
-            _ => {
-                self.best = splined;
-                if self.offsets() && self.drop_spline() {
-                    self.lenses();
-                }
             }
         }
     }
 
     fn spline(&mut self, cells: f64) -> bool {
-        self.take_if_better(
-            format!("spline of {cells:.0} cells along the longer side"),
-            NEEDED_GAIN,
-            |model| set_spline(model, cells),
-        )
+        self.take_if_better(Alternative::Spline { cells }, NEEDED_GAIN, |model| {
+            set_spline(model, cells);
+        })
     }
 
     fn offsets(&mut self) -> bool {
-        self.take_if_better(
-            "offsets of all cameras".to_string(),
-            NEEDED_GAIN,
-            add_offsets,
-        )
+        self.take_if_better(Alternative::Offsets, NEEDED_GAIN, add_offsets)
+    }
+
+    /// Offsets on the best model, against a rival that is none of its own.
+    fn offsets_beyond(&mut self, rival: f64) -> bool {
+        self.best.evidence = rival;
+        self.take_if_better(Alternative::OffsetsForSpline, 0.0, add_offsets)
     }
 
     /// Base lenses that were fitted as if central hold part of what offsets explain.
     fn lenses(&mut self) {
         let observations = self.observations;
         for _ in 0..MOST_REBASES {
-            let what = "base lenses fitted anew".to_string();
-            if !self.take_if_better(what, NEEDED_GAIN, |model| rebase(model, observations)) {
+            let renew = |model: &mut Model| rebase(model, observations);
+            if !self.take_if_better(Alternative::Lenses, NEEDED_GAIN, renew) {
                 break;
             }
         }
     }
 
     fn drop_spline(&mut self) -> bool {
-        self.take_if_better("no spline".to_string(), -NEEDED_GAIN, |model| {
+        self.take_if_better(Alternative::NoSpline, -NEEDED_GAIN, |model| {
             for camera in &mut model.cameras {
                 camera.field.direction.spline = None;
             }
@@ -195,8 +207,8 @@ impl Search<'_> {
         let mut changed = false;
         for camera_idx in 0..self.best.fit.model.cameras.len() {
             if self.best.fit.model.cameras[camera_idx].offset().is_some() {
-                let what = format!("camera {camera_idx} central");
-                changed |= self.take_if_better(what, -NEEDED_GAIN, |model| {
+                let tried = Alternative::Central { camera_idx };
+                changed |= self.take_if_better(tried, -NEEDED_GAIN, |model| {
                     model.cameras[camera_idx].drop_offset();
                 });
             }
@@ -208,25 +220,19 @@ impl Search<'_> {
 
     fn take_if_better(
         &mut self,
-        what: String,
+        tried: Alternative,
         needed: f64,
         change: impl FnOnce(&mut Model),
     ) -> bool {
         // A model that the data leave open has no evidence for it; the one so far stands.
         let changed = self.best.fit.changed(self.observations, change);
-        let Ok(candidate) = Candidate::settle(changed, self.best.evidence, self.observations)
-        else {
-            self.tried.push(Choice {
-                what,
-                gain: f64::NEG_INFINITY,
-                taken: false,
-            });
-            return false;
-        };
-        let gain = candidate.evidence - self.best.evidence;
-        let taken = gain > needed;
-        self.tried.push(Choice { what, gain, taken });
-        if taken {
+        let settled = Candidate::settle(changed, self.best.evidence, self.observations).ok();
+        let gain = settled
+            .as_ref()
+            .map(|candidate| candidate.evidence - self.best.evidence);
+        let taken = gain.is_some_and(|gain| gain > needed);
+        self.tried.push(Choice { tried, gain, taken });
+        if let Some(candidate) = settled.filter(|_| taken) {
             self.best = candidate;
         }
         taken

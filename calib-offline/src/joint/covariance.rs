@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, Matrix2, Matrix3x2, Matrix4, Vector3};
 /// Nodes of a grid along the longer side of the sensor.
 const NODES_ALONG_LONGER_SIDE: usize = 11;
 /// Singular values below this count as zero: a rigid motion that moves no point (mm per rad or mm).
-const RIGID_RANK_SHARE: f64 = 1e-9;
+pub(super) const RIGID_RANK_SHARE: f64 = 1e-9;
 
 impl Estimate {
     /// Fills in how well the pairs of a rig (made by [`Estimate::rig`]) know their rays (METHOD 5).
@@ -79,29 +79,21 @@ impl Estimate {
 
     /// Median distance from the first camera to the boards, mm.
     fn working_distance_mm(&self, rig: &Rig) -> f64 {
-        let center = self.observations.board.center_in_board();
-        let mut distances: Vec<f64> = self
-            .rig_from_board()
-            .iter()
-            .map(|pose| {
-                (pose.point(&center) - rig.cameras[0].rig_from_camera.translation_mm).norm()
-            })
-            .collect();
-        distances.sort_by(f64::total_cmp);
+        let distances = self.board_distances_mm(rig);
         distances.get(distances.len() / 2).copied().unwrap_or(1.0)
     }
 }
 
 /// A camera's part in a node.
 #[derive(Clone, Copy)]
-struct Node {
-    sighting: Sighting,
+pub(super) struct Node {
+    pub(super) sighting: Sighting,
     /// Rig frame.
     ray: Ray,
     /// The two axes across the ray, rig frame.
-    axes: Matrix3x2<f64>,
+    pub(super) axes: Matrix3x2<f64>,
     /// Shift of the ray along its axes, at the point, per px.
-    mm_per_px: Matrix2<f64>,
+    pub(super) mm_per_px: Matrix2<f64>,
     /// Distance of the point along the ray, mm.
     distance_mm: f64,
     /// Whether it is the nearest measured place, in place of a node that is not measured.
@@ -141,7 +133,9 @@ fn nodes(
             node(indices[1], pair[1], other, point_in_rig),
         ])
     };
-    let measured: Vec<(PixelPoint, [Node; 2])> = covered_cells(pair[0])
+    let measured: Vec<(PixelPoint, [Node; 2])> = pair[0]
+        .coverage
+        .covered_middles()
         .into_iter()
         .filter_map(|pixel| Some((pixel, see_both(pixel)?)))
         .collect();
@@ -164,7 +158,8 @@ fn nodes(
         .collect()
 }
 
-fn node(
+/// A camera's part in a point that it sees at a pixel.
+pub(super) fn node(
     camera_idx: usize,
     camera: &CalibratedCamera,
     pixel: PixelPoint,
@@ -189,19 +184,19 @@ fn node(
     }
 }
 
-/// Middles of the calibrated cells.
-fn covered_cells(camera: &CalibratedCamera) -> Vec<PixelPoint> {
-    let mask = &camera.coverage;
-    let (width_px, height_px) = mask.cell_size_px();
-    (0..mask.cells_u * mask.cells_v)
-        .filter(|cell| mask.covered[*cell])
-        .map(|cell| {
-            PixelPoint::new(
-                ((cell % mask.cells_u) as f64 + 0.5) * width_px - 0.5,
-                ((cell / mask.cells_u) as f64 + 0.5) * height_px - 0.5,
-            )
-        })
-        .collect()
+/// What predictions (px) do to the points of nodes, mm; `None` where rays are parallel.
+pub(super) fn points_by_predictions(nodes: &[[Node; 2]]) -> Option<DMatrix<f64>> {
+    let mut to_points = DMatrix::zeros(3 * nodes.len(), 4 * nodes.len());
+    for (k, [a, b]) in nodes.iter().enumerate() {
+        let (by_a, by_b) = midpoint_by_shifts(&a.ray, &b.ray)?;
+        to_points
+            .view_mut((3 * k, 4 * k), (3, 2))
+            .copy_from(&(by_a * a.axes * a.mm_per_px));
+        to_points
+            .view_mut((3 * k, 4 * k + 2), (3, 2))
+            .copy_from(&(by_b * b.axes * b.mm_per_px));
+    }
+    Some(to_points)
 }
 
 /// What remains of the covariance when the best rigid motion of all measured points is taken out.
@@ -222,16 +217,7 @@ fn without_rigid_motions(
             .copy_from(&(-by * skew(&node.sighting.point_in_board)));
         motions.view_mut((2 * k, 3), (2, 3)).copy_from(&by);
     }
-    let mut to_points = DMatrix::zeros(3 * nodes.len(), count);
-    for (k, [a, b]) in nodes.iter().enumerate() {
-        let (by_a, by_b) = midpoint_by_shifts(&a.ray, &b.ray)?;
-        to_points
-            .view_mut((3 * k, 4 * k), (3, 2))
-            .copy_from(&(by_a * a.axes * a.mm_per_px));
-        to_points
-            .view_mut((3 * k, 4 * k + 2), (3, 2))
-            .copy_from(&(by_b * b.axes * b.mm_per_px));
-    }
+    let mut to_points = points_by_predictions(nodes)?;
     // Only points that are measured say where the rig moved to.
     for (k, [a, _]) in nodes.iter().enumerate() {
         if a.stands_in {

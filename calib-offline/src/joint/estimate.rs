@@ -26,7 +26,7 @@ const STRUCTURED: Settings = Settings {
 const BASE_ROUNDS: usize = 2;
 /// The last adjustment. It needs two or three steps; a share of 1e-8 of the objective moves no
 /// parameter by a hundredth of its standard deviation.
-const LAST: Settings = Settings {
+pub(super) const LAST: Settings = Settings {
     max_iterations: 30,
     relative_decrease: 1e-8,
 };
@@ -46,6 +46,8 @@ pub struct Estimate {
     pub noise: StudentT,
     /// Correlation of neighboring corners' residuals.
     pub neighbor_correlation: f64,
+    /// Share of the corners that counts as independent because of it, 0 to 1.
+    pub effective_share: f64,
     /// Smoothness per camera and family.
     pub smoothness: Vec<SmoothnessFound>,
     /// What the evidence decided.
@@ -135,7 +137,8 @@ fn starting_model(start: &RigStart) -> Model {
     }
 }
 
-fn finish(
+/// What a fit that is as good as it gets says.
+pub(super) fn finish(
     fit: Fit,
     observations: Observations,
     neighbor_correlation: f64,
@@ -165,6 +168,7 @@ fn finish(
         robust_weights,
         noise: fit.noise,
         neighbor_correlation,
+        effective_share: fit.share,
         choices,
         costs: fit.costs.clone(),
         stop: fit.stop,

@@ -9,6 +9,7 @@ use crate::adjust::{CameraModel, Model};
 use nalgebra::DVector;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Inverse variances at the start: directions may move by 1e-3 rad, a spline's second differences
@@ -31,7 +32,8 @@ const PROBES: usize = 16;
 const PROBE_SEED: u64 = 0x5eed;
 
 /// A family of parameters that share one smoothness weight.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Family {
     /// Directions of the field's polynomial of this total degree, beyond the structured ones.
     Direction(usize),
@@ -90,7 +92,7 @@ pub struct Smoothness {
 }
 
 /// What the evidence found for one family.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SmoothnessFound {
     /// Index of the camera.
     pub camera_idx: usize,

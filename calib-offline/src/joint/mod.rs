@@ -8,9 +8,12 @@ pub mod covariance;
 pub mod estimate;
 pub mod evidence;
 pub mod fit;
+pub mod point_covariance;
 pub mod rebase;
 pub mod recheck;
+pub mod refit;
 
-pub use choice::Choice;
+pub use choice::{Alternative, Choice};
 pub use estimate::{Estimate, EstimateError, estimate};
+pub use evidence::{Family, SmoothnessFound};
 pub use recheck::estimate_screened;

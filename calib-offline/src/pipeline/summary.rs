@@ -1,20 +1,20 @@
 //! What the steps found, put into the record.
 
 use super::Corners;
+use super::left_out::{left_out, renumbered};
 use crate::adjust::Observations;
 use crate::adjust::StopReason;
 use crate::dataset::identity::input_sha256;
 use crate::dataset::{Dataset, stage};
-use crate::detect::verdict::Outcome;
-use crate::evaluate::HeldOut;
-use crate::evaluate::fit_stage_axes;
+use crate::evaluate::half_data::HalfDataCheck;
 use crate::evaluate::verdict::{Figures, Thresholds, judge};
+use crate::evaluate::{CrossChecks, HeldOut, fit_stage_axes};
 use crate::field::Rig;
-use crate::init::screening::{Finding, FindingKind};
+use crate::init::screening::Finding;
 use crate::joint::Estimate;
 use crate::report::record::{
-    Calibration, CornerRecord, EstimateRecord, HeldOutRecord, LeftOut, PoseRecord, Renumbered,
-    SCHEMA, StageAxis,
+    Calibration, ChoicesRecord, CornerRecord, EstimateRecord, HeldOutRecord, PoseRecord, SCHEMA,
+    StageAxis,
 };
 use nalgebra::Vector2;
 
@@ -32,8 +32,12 @@ pub struct Parts<'a> {
     pub rig: Rig,
     /// What was found wrong with views.
     pub findings: &'a [Finding],
+    /// Peak to valley of the board's shape and its standard deviation, mm.
+    pub board_peak_to_valley_mm: (f64, f64),
     /// The check on unseen boards.
     pub held_out: &'a HeldOut,
+    /// The checks against itself.
+    pub checks: CrossChecks,
     /// What counts as good.
     pub thresholds: &'a Thresholds,
 }
@@ -58,6 +62,10 @@ pub fn record(parts: &Parts) -> Calibration {
             rms_px: summary.rms_px,
             held_out_rms_px: held_out.as_ref().and_then(|h| h.rms_px),
             neighbor_rms_percent: held_out.as_ref().and_then(|h| h.neighbor_rms_percent),
+            half_data_ratio: match &parts.checks.half_data {
+                HalfDataCheck::Compared(halves) => Some(halves.ratio),
+                HalfDataCheck::Skipped(_) => None,
+            },
             corners: (summary.corners_used, summary.corners_rejected),
             suspect_views: (parts.findings.len(), parts.observations.views.len()),
             pose_count: estimate.pose_count(),
@@ -87,7 +95,9 @@ pub fn record(parts: &Parts) -> Calibration {
         left_out: left_out(parts, &names),
         renumbered: renumbered(parts.findings, &names),
         estimate: summary,
+        choices: Some(choices(parts)),
         held_out,
+        checks: Some(parts.checks.clone()),
         verdict,
     }
 }
@@ -133,6 +143,20 @@ fn estimate_record(estimate: &Estimate, corners: &[CornerRecord]) -> EstimateRec
     }
 }
 
+fn choices(parts: &Parts) -> ChoicesRecord {
+    let estimate = parts.estimate;
+    let (board_peak_to_valley_mm, board_peak_to_valley_sd_mm) = parts.board_peak_to_valley_mm;
+    ChoicesRecord {
+        tried: estimate.choices.clone(),
+        smoothness: estimate.smoothness.clone(),
+        noise_freedom: estimate.noise.freedom,
+        neighbor_correlation: estimate.neighbor_correlation,
+        effective_share: estimate.effective_share,
+        board_peak_to_valley_mm,
+        board_peak_to_valley_sd_mm,
+    }
+}
+
 fn held_out_record(held_out: &HeldOut) -> Option<HeldOutRecord> {
     if held_out.folds == 0 {
         return None;
@@ -141,7 +165,8 @@ fn held_out_record(held_out: &HeldOut) -> Option<HeldOutRecord> {
     lengths.sort_by(f64::total_cmp);
     Some(HeldOutRecord {
         folds: held_out.folds,
-        failed_folds: held_out.failed_folds,
+        failed_folds: held_out.failed.len(),
+        fold_failures: held_out.failed.clone(),
         rms_px: rms(&lengths),
         median_px: lengths.get(lengths.len() / 2).copied(),
         neighbor_rms_percent: rms(&held_out.boards.neighbor_errors).map(|e| 100.0 * e),
@@ -191,129 +216,6 @@ fn stage_axes(parts: &Parts, poses: &[PoseRecord]) -> Vec<StageAxis> {
     fit_stage_axes(poses, |pose| {
         stage::entry(parts.dataset, &all_poses, pose).placement
     })
-}
-
-/// Poses, views and corners that did not go in.
-fn left_out(parts: &Parts, names: &[String]) -> Vec<LeftOut> {
-    let mut list: Vec<LeftOut> = Vec::new();
-    for pose in &parts.dataset.excluded_poses {
-        let corner_count = parts
-            .corners
-            .views
-            .iter()
-            .filter(|view| view.pose == *pose)
-            .map(|view| view.corners.len())
-            .sum();
-        list.push(LeftOut {
-            pose: *pose,
-            camera: None,
-            corner_count,
-            reason: "excluded by the user".to_string(),
-        });
-    }
-    let estimate = parts.estimate;
-    for (pose_idx, pose) in parts.observations.poses.iter().enumerate() {
-        let is_named = parts.findings.iter().any(|finding| finding.pose == *pose);
-        if !is_named && estimate.observations.poses.binary_search(pose).is_err() {
-            let views = parts.observations.views.iter();
-            list.push(LeftOut {
-                pose: *pose,
-                camera: None,
-                corner_count: views
-                    .filter(|view| view.pose_idx == pose_idx)
-                    .map(|view| view.corners.len())
-                    .sum(),
-                reason: "no camera sees enough of the board to place it".to_string(),
-            });
-        }
-    }
-    for (view, weights) in estimate
-        .observations
-        .views
-        .iter()
-        .zip(&estimate.robust_weights)
-    {
-        let rejected = weights.iter().filter(|weight| **weight == 0.0).count();
-        if rejected > 0 {
-            list.push(LeftOut {
-                pose: estimate.observations.poses[view.pose_idx],
-                camera: Some(names[view.camera_idx].clone()),
-                corner_count: rejected,
-                reason: format!(
-                    "{rejected} of {} corners rejected as outliers",
-                    weights.len()
-                ),
-            });
-        }
-    }
-    list.extend(parts.findings.iter().filter_map(|f| screened_out(f, names)));
-    for image in parts.corners.detection.iter().flat_map(|d| &d.images) {
-        if let Outcome::Refused(refusal) = &image.outcome {
-            list.push(LeftOut {
-                pose: image.pose,
-                camera: Some(names[image.camera_idx].clone()),
-                corner_count: 0,
-                reason: refusal.to_string(),
-            });
-        }
-    }
-    list
-}
-
-/// What the screening left out; `None` for a view that is used as it should be.
-fn screened_out(finding: &Finding, names: &[String]) -> Option<LeftOut> {
-    let (corner_count, reason) = match &finding.kind {
-        FindingKind::Misfit {
-            median_px,
-            typical_px,
-        } => (
-            finding.corner_count,
-            format!(
-                "the whole view misses by {median_px:.2} px (median; {typical_px:.2} px in other \
-                 views): the board moved during the exposure, is bent, or is another one"
-            ),
-        ),
-        FindingKind::Unsynchronized {
-            other_camera_idx,
-            misfit_px,
-            typical_px,
-        } => (
-            0,
-            format!(
-                "not the same board position as in camera {} ({misfit_px:.2} px apart, other pairs \
-                 {typical_px:.2} px): not exposed at the same instant; left out as a pair, each \
-                 view used for its own camera",
-                names[*other_camera_idx]
-            ),
-        ),
-        FindingKind::Renumbered { .. } => return None,
-    };
-    Some(LeftOut {
-        pose: finding.pose,
-        camera: Some(names[finding.camera_idx].clone()),
-        corner_count,
-        reason,
-    })
-}
-
-fn renumbered(findings: &[Finding], names: &[String]) -> Vec<Renumbered> {
-    findings
-        .iter()
-        .filter_map(|finding| match &finding.kind {
-            FindingKind::Renumbered {
-                other_camera_idx, ..
-            } => Some(Renumbered {
-                pose: finding.pose,
-                camera: names[finding.camera_idx].clone(),
-                reason: format!(
-                    "numbered from the other end of the board than in camera {}; renumbered, and \
-                     used",
-                    names[*other_camera_idx]
-                ),
-            }),
-            _ => None,
-        })
-        .collect()
 }
 
 /// Root mean square; `None` of nothing.

@@ -1,12 +1,18 @@
 //! A made-up but plausible calibration, to develop and test the report with.
 
 use super::record::{
-    BoardShape, Calibration, CornerRecord, EstimateRecord, Grade, HeldOutRecord, LeftOut,
-    PoseRecord, SCHEMA, Verdict,
+    BoardShape, Calibration, ChoicesRecord, CornerRecord, EstimateRecord, Grade, HeldOutRecord,
+    LeftOut, PoseRecord, Renumbered, SCHEMA, Verdict,
 };
 use crate::board::BoardSpec;
+use crate::evaluate::CrossChecks;
+use crate::evaluate::central_model::CentralModel;
+use crate::evaluate::centrality::Centrality;
+use crate::evaluate::half_data::{HalfData, HalfDataCheck};
+use crate::evaluate::working_volume::PointDifference;
 use crate::field::{BaseLens, CalibratedCamera, CoverageMask, Projection, RayField, Rig};
 use crate::geometry::{PixelPoint, RigidTransform, SensorSize, so3};
+use crate::joint::{Alternative, Choice, Family, SmoothnessFound};
 use nalgebra::{Vector2, Vector3};
 
 const SENSOR: SensorSize = SensorSize::new(1280, 1024);
@@ -64,21 +70,8 @@ pub fn calibration() -> Calibration {
     let cameras = rig_from_cameras
         .iter()
         .enumerate()
-        .map(|(camera_idx, (name, rig_from_camera))| CalibratedCamera {
-            name: (*name).to_owned(),
-            field: RayField::ideal(
-                SENSOR,
-                BaseLens::ideal(Projection::Perspective, FOCAL_PX),
-                3,
-            ),
-            coverage: CoverageMask::from_corners(
-                SENSOR,
-                corners
-                    .iter()
-                    .filter(|c| c.camera_idx == camera_idx)
-                    .map(|c| c.observed),
-            ),
-            rig_from_camera: *rig_from_camera,
+        .map(|(camera_idx, (name, rig_from_camera))| {
+            camera(camera_idx, name, *rig_from_camera, &corners)
         })
         .collect();
     Calibration {
@@ -100,7 +93,15 @@ pub fn calibration() -> Calibration {
         poses,
         corners,
         left_out: left_out(),
-        renumbered: Vec::new(),
+        renumbered: vec![Renumbered {
+            pose: 7,
+            camera: "right".to_owned(),
+            reason: "numbered from the other end of the board than in camera left; renumbered, \
+                     and used"
+                .to_owned(),
+        }],
+        choices: Some(choices()),
+        checks: Some(checks()),
         held_out: Some(held_out()),
         verdict: Verdict {
             grade: Grade::Doubtful,
@@ -109,6 +110,25 @@ pub fn calibration() -> Calibration {
                 "right: 79 % of the sensor is calibrated (limit 85 %)".to_owned(),
             ],
         },
+    }
+}
+
+fn camera(
+    camera_idx: usize,
+    name: &str,
+    rig_from_camera: RigidTransform,
+    corners: &[CornerRecord],
+) -> CalibratedCamera {
+    let base = BaseLens {
+        projection: Projection::Perspective,
+        focal_px: FOCAL_PX,
+    };
+    let own = corners.iter().filter(|c| c.camera_idx == camera_idx);
+    CalibratedCamera {
+        name: name.to_owned(),
+        field: RayField::ideal(SENSOR, base, 3),
+        coverage: CoverageMask::from_corners(SENSOR, own.map(|c| c.observed)),
+        rig_from_camera,
     }
 }
 
@@ -130,12 +150,79 @@ fn held_out() -> HeldOutRecord {
     HeldOutRecord {
         folds: 5,
         failed_folds: 0,
+        fold_failures: Vec::new(),
         rms_px: Some(0.0741),
         median_px: Some(0.0602),
         neighbor_rms_percent: Some(0.152),
         rigid_rms_mm: Some(0.0113),
         point_count: 5872,
         outside_count: 41,
+    }
+}
+
+fn choices() -> ChoicesRecord {
+    let choice = |tried, gain, taken| Choice {
+        tried,
+        gain: Some(gain),
+        taken,
+    };
+    let found = |camera_idx, family, parameters, effective| SmoothnessFound {
+        camera_idx,
+        family,
+        parameters,
+        effective,
+        precision: 1e6,
+    };
+    ChoicesRecord {
+        tried: vec![
+            choice(Alternative::Offsets, 606.8, true),
+            choice(Alternative::Spline { cells: 11.5 }, -2.2, false),
+            choice(Alternative::Central { camera_idx: 0 }, -540.0, false),
+            choice(Alternative::Central { camera_idx: 1 }, 2.0, true),
+        ],
+        smoothness: vec![
+            found(0, Family::Direction(2), 2, 1.9),
+            found(0, Family::Offset(3), 20, 14.2),
+            found(0, Family::Offset(4), 52, 2.8),
+            found(1, Family::Direction(2), 2, 1.8),
+        ],
+        noise_freedom: 1000.0,
+        neighbor_correlation: 0.01,
+        effective_share: 0.96,
+        board_peak_to_valley_mm: 0.062,
+        board_peak_to_valley_sd_mm: 0.004,
+    }
+}
+
+fn checks() -> CrossChecks {
+    let cameras = [(0.082, 0.39, Some([0.0793, 0.0818])), (0.0, 0.0, None)];
+    CrossChecks {
+        centrality: cameras
+            .map(|(rms_mm, max_mm, halves_rms_mm)| Centrality {
+                central: rms_mm == 0.0,
+                point_in_camera_mm: Vector3::new(0.0, 0.0, 20.0 * rms_mm),
+                rms_mm,
+                max_mm,
+                halves_rms_mm,
+            })
+            .into(),
+        central_model: CentralModel::Costs {
+            evidence_loss: 606.8,
+            points: Some(PointDifference {
+                points: 193,
+                rms_mm: 0.0232,
+                max_mm: 0.0933,
+            }),
+        },
+        half_data: HalfDataCheck::Compared(HalfData {
+            poses: [17, 16],
+            points: 65,
+            difference_rms_mm: 0.002992,
+            predicted_rms_mm: 0.002891,
+            ratio: 1.036,
+            modes: 9.0,
+            ratio_by_chance: [0.546, 1.453],
+        }),
     }
 }
 

@@ -2,6 +2,9 @@
 //! Each is read or measured off the record; nothing is estimated here.
 
 use super::record::{Calibration, Grade};
+use super::words;
+use crate::evaluate::central_model::CentralModel;
+use crate::evaluate::half_data::HalfDataCheck;
 use serde::Serialize;
 use std::collections::BTreeSet;
 
@@ -20,6 +23,12 @@ pub struct Facts {
     pub held_out_rigid_mm: Option<f64>,
     /// RMS residual vector of held-out corners, px.
     pub held_out_rms_px: Option<f64>,
+    /// RMS distance between the points of two calibrations from half of the poses, mm.
+    pub half_data_mm: Option<f64>,
+    /// The same over what their covariances predict.
+    pub half_data_ratio: Option<f64>,
+    /// RMS distance by which a central model would move points, mm; 0 if all cameras are central.
+    pub central_model_mm: Option<f64>,
     /// RMS residual vector of the corners used, px.
     pub rms_px: f64,
     /// Noise per axis, px.
@@ -55,6 +64,11 @@ pub struct CameraFacts {
     pub views: usize,
     /// Whether all rays meet in one point by construction.
     pub central: bool,
+    /// RMS distance of its rays from the point nearest to all, mm; 0 of a central camera.
+    pub centrality_rms_mm: Option<f64>,
+    /// Offset numbers that the data determine, and those that the model has; `None` of a central
+    /// camera.
+    pub offset_numbers: Option<(f64, usize)>,
 }
 
 /// Smallest, middle and largest of some lengths.
@@ -79,6 +93,12 @@ impl Facts {
             .iter()
             .map(|c| (c.camera_idx, c.pose))
             .collect();
+        let checks = calibration.checks.as_ref();
+        let halves = checks.and_then(|checks| match &checks.half_data {
+            HalfDataCheck::Compared(halves) => Some(halves),
+            HalfDataCheck::Skipped(_) => None,
+        });
+        let choices = calibration.choices.as_ref();
         let place = |k: usize| cameras[k].rig_from_camera.translation_mm;
         Self {
             verdict: calibration.verdict.grade,
@@ -88,6 +108,13 @@ impl Facts {
                 .map(|percent| percent / 100.0 * calibration.board.square_mm),
             held_out_rigid_mm: held_out.and_then(|h| h.rigid_rms_mm),
             held_out_rms_px: held_out.and_then(|h| h.rms_px),
+            half_data_mm: halves.map(|halves| halves.difference_rms_mm),
+            half_data_ratio: halves.map(|halves| halves.ratio),
+            central_model_mm: checks.and_then(|checks| match checks.central_model {
+                CentralModel::IsCentral { .. } => Some(0.0),
+                CentralModel::Costs { points, .. } => points.map(|points| points.rms_mm),
+                CentralModel::NoEstimate => None,
+            }),
             rms_px: calibration.estimate.rms_px,
             sigma_px: calibration.estimate.sigma_px,
             cameras: cameras
@@ -99,6 +126,12 @@ impl Facts {
                     covered_share: camera.coverage.covered_share(),
                     views: views.iter().filter(|(c, _)| *c == camera_idx).count(),
                     central: camera.field.is_central(),
+                    centrality_rms_mm: checks
+                        .and_then(|checks| checks.centrality.get(camera_idx))
+                        .map(|found| found.rms_mm),
+                    offset_numbers: choices
+                        .and_then(|choices| words::offset_numbers(choices, camera_idx))
+                        .map(|numbers| (numbers.effective, numbers.all)),
                 })
                 .collect(),
             baseline_mm: (1..cameras.len())

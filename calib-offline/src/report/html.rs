@@ -1,9 +1,13 @@
 //! The report page: one HTML file that needs nothing else, no network and no scripts.
 
+use super::choices_page;
 use super::facts::Facts;
+use super::left_out_page;
 use super::plot::{Figure, cost, coverage, histogram, pose_rms, residual_vectors, scene};
-use super::record::Calibration;
+use super::record::{Calibration, HeldOutRecord};
 use super::text::short;
+use super::words;
+use crate::evaluate::half_data::HalfDataCheck;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde::Serialize;
 
@@ -64,7 +68,8 @@ pub fn page(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
                     (verdict(&facts))
                     (headline(calibration, &facts, blob))
                     (figures(calibration))
-                    (left_out(calibration))
+                    (choices_page::draw(calibration))
+                    (left_out_page::draw(calibration))
                     (provenance(calibration))
                 }
             }
@@ -114,9 +119,17 @@ fn headline(calibration: &Calibration, facts: &Facts, blob: Option<&BlobFacts>) 
                 (card("Held-out residual", &px(value), "RMS residual vector, board pose refitted"))
             }
             @if let Some(held_out) = held_out {
-                (card("Held-out check", &format!("{} folds", held_out.folds), &format!("by pose; {} points, {} outside the calibrated area", held_out.point_count, held_out.outside_count)))
+                (card("Held-out check", &format!("{} folds", held_out.folds), &format!("by pose; {} points, {} outside the calibrated area{}", held_out.point_count, held_out.outside_count, failed_folds(held_out))))
             } @else {
                 (card("Held-out check", "none", "too few poses to leave some out"))
+            }
+            @if let Some(checks) = &calibration.checks {
+                @match &checks.half_data {
+                    HalfDataCheck::Compared(halves) => {
+                        (card("Half-data check", &format!("ratio {:.2}", halves.ratio), &format!("two halves of the poses differ by {} mm RMS, {} predicted", short(halves.difference_rms_mm), short(halves.predicted_rms_mm))))
+                    }
+                    HalfDataCheck::Skipped(_) => (card("Half-data check", "none", &words::half_data(&checks.half_data))),
+                }
             }
             (card("Corner noise", &px(facts.sigma_px), "standard deviation per axis, robust estimate"))
             (card("Residual", &px(facts.rms_px), &format!("RMS residual vector of the {} corners used", facts.corners_used)))
@@ -140,6 +153,13 @@ fn headline(calibration: &Calibration, facts: &Facts, blob: Option<&BlobFacts>) 
             }
         }
     }
+}
+
+fn failed_folds(held_out: &HeldOutRecord) -> String {
+    let failures = held_out.fold_failures.iter();
+    failures.fold(String::new(), |text, failed| {
+        text + &format!("; fold {} gave no estimate: {}", failed.fold, failed.reason)
+    })
 }
 
 fn share_rejected(facts: &Facts) -> String {
@@ -180,33 +200,6 @@ fn group(title: &str, figures: &[Figure], how_to_read: &str) -> Markup {
                             @if figure.title != title { h3 { (figure.title) } }
                             (PreEscaped(&figure.svg))
                             figcaption { (figure.caption) }
-                        }
-                    }
-                }
-            }
-        }
-    }
-}
-
-fn left_out(calibration: &Calibration) -> Markup {
-    html! {
-        section {
-            h2 { "Left out" }
-            @if calibration.left_out.is_empty() {
-                p { "Nothing: every image was used." }
-            } @else {
-                div.scroll {
-                    table {
-                        thead { tr { th { "Pose" } th { "Camera" } th { "Corners" } th { "Reason" } } }
-                        tbody {
-                            @for left in &calibration.left_out {
-                                tr {
-                                    td.number { (left.pose) }
-                                    td { (left.camera.as_deref().unwrap_or("all")) }
-                                    td.number { (left.corner_count) }
-                                    td { (left.reason) }
-                                }
-                            }
                         }
                     }
                 }
@@ -265,12 +258,17 @@ mod tests {
             "200.00 mm",
             "48320 bytes",
             "excluded by the user",
+            "numbered from the other end of the board than in camera left",
+            "ratio 1.04",
+            "17 of 72",
+            "+606.8",
+            "spline of 11.5 cells",
             &"9f2c4e".repeat(3),
         ] {
             assert!(page.contains(part), "{part} is not in the page");
         }
         assert_eq!(page.matches("<svg").count(), 9);
-        assert_eq!(page.matches("How to read this").count(), 6);
+        assert_eq!(page.matches("How to read this").count(), 8);
     }
 
     #[test]
@@ -291,6 +289,8 @@ mod tests {
         calibration.poses.clear();
         calibration.left_out.clear();
         calibration.held_out = None;
+        calibration.choices = None;
+        calibration.checks = None;
         calibration.estimate.cost_per_iteration.clear();
         calibration.estimate.sigma_px = f64::NAN;
         let page = page(&calibration, None);

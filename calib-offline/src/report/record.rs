@@ -2,9 +2,12 @@
 
 pub use crate::board::BoardShape;
 use crate::board::BoardSpec;
+pub use crate::evaluate::CrossChecks;
+pub use crate::evaluate::held_out::FailedFold;
 pub use crate::evaluate::verdict::{Grade, Verdict};
 use crate::field::Rig;
 use crate::geometry::{PixelPoint, RigidTransform};
+use crate::joint::{Choice, SmoothnessFound};
 use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -47,8 +50,14 @@ pub struct Calibration {
     pub renumbered: Vec<Renumbered>,
     /// How the estimate went.
     pub estimate: EstimateRecord,
+    /// What the estimate chose by itself; `None` in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub choices: Option<ChoicesRecord>,
     /// Held-out check; `None` if there were too few poses for one.
     pub held_out: Option<HeldOutRecord>,
+    /// Checks of the calibration against itself; `None` in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub checks: Option<CrossChecks>,
     /// The judgement.
     pub verdict: Verdict,
 }
@@ -142,6 +151,28 @@ pub struct EstimateRecord {
     pub corners_rejected: usize,
 }
 
+/// What the estimate chose by itself, each with its evidence. "Evidence" is twice the logarithm of
+/// the probability of the data under a model; the scale is that of Kass and Raftery (1995).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ChoicesRecord {
+    /// The alternatives, in the order tried.
+    pub tried: Vec<Choice>,
+    /// How strongly smoothness holds each family of numbers of each camera, and how many of
+    /// them the data determine.
+    pub smoothness: Vec<SmoothnessFound>,
+    /// Degrees of freedom of the Student-t distribution of the residuals: 3 has heavy tails, 1000
+    /// is a Gaussian. Its scale is `sigma_px` of the estimate.
+    pub noise_freedom: f64,
+    /// Correlation of the residuals of neighboring corners: 0 for independent corners.
+    pub neighbor_correlation: f64,
+    /// Share of the corners that counts as independent because of it, 0 to 1.
+    pub effective_share: f64,
+    /// Distance from the highest to the lowest corner of the board's shape, mm.
+    pub board_peak_to_valley_mm: f64,
+    /// Its standard deviation, as far as the terms of the shape are independent, mm.
+    pub board_peak_to_valley_sd_mm: f64,
+}
+
 /// Boards the estimate never saw, measured with the rig.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HeldOutRecord {
@@ -150,6 +181,9 @@ pub struct HeldOutRecord {
     /// Folds whose other poses gave no estimate; nothing is known of their boards.
     #[serde(default)]
     pub failed_folds: usize,
+    /// Which, and why.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fold_failures: Vec<FailedFold>,
     /// RMS residual vector of the held-out corners, board pose refitted, px.
     pub rms_px: Option<f64>,
     /// Median of the same.

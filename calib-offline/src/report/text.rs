@@ -3,6 +3,7 @@
 use super::facts::Facts;
 use super::html::BlobFacts;
 use super::record::Calibration;
+use super::words;
 use std::fmt::Write as _;
 
 /// A few lines, each with one fact and its unit; no colors.
@@ -21,18 +22,30 @@ pub fn summary(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
             facts.corners_rejected
         ),
     ));
-    for camera in &facts.cameras {
+    if let Some(checks) = &calibration.checks {
+        lines.push(("half-data check", words::half_data(&checks.half_data)));
+    }
+    for (camera_idx, camera) in facts.cameras.iter().enumerate() {
         let [width, height] = camera.sensor_px;
         lines.push((
             "camera",
             format!(
-                "{}, {width} x {height} px, {} images, {:.0} % of the sensor calibrated{}",
+                "{}, {width} x {height} px, {} images, {:.0} % of the sensor calibrated",
                 camera.name,
                 camera.views,
                 100.0 * camera.covered_share,
-                if camera.central { "" } else { ", non-central" }
             ),
         ));
+        if let Some(model) = words::camera_model(calibration, camera_idx) {
+            lines.push(("", model));
+        }
+    }
+    if let Some(checks) = &calibration.checks {
+        lines.push(("central model", words::central_model(&checks.central_model)));
+    }
+    if let Some(choices) = &calibration.choices {
+        lines.push(("board's shape", words::board(choices)));
+        lines.push(("noise", words::noise(choices)));
     }
     for (camera, baseline_mm) in facts.cameras.iter().skip(1).zip(&facts.baseline_mm) {
         lines.push((
@@ -111,7 +124,11 @@ fn held_out(calibration: &Calibration, facts: &Facts) -> String {
     }
     let failed = match held_out.failed_folds {
         0 => String::new(),
-        count => format!("; {count} more gave no estimate"),
+        count => {
+            let first = held_out.fold_failures.first();
+            let reason = first.map_or(String::new(), |failed| format!(": {}", failed.reason));
+            format!("; {count} more gave no estimate{reason}")
+        }
     };
     format!(
         "{} (RMS, {} folds by pose{failed})",
@@ -138,6 +155,7 @@ pub fn short(value: f64) -> String {
 mod tests {
     use super::*;
     use crate::report::example;
+    use crate::report::record::FailedFold;
 
     #[test]
     fn three_digits_are_shown_at_any_size() {
@@ -171,10 +189,24 @@ mod tests {
             "200.00 mm from left to right",
             "33 poses, 65 images used; 2 left out",
             "pose 30, right: no board found",
+            "differ by 0.00299 mm RMS, 0.00289 predicted: ratio 1.04, as predicted (0.5 to 1.5 by chance)",
+            "non-central, 17 of 72 offset numbers used, rays 0.0820 mm RMS from one point (most 0.390",
+            "central (0 mm by choice)",
+            "would move points by 0.0232 mm RMS (most 0.0933) and change the evidence by -607",
+            "renumbered      pose 7, right: numbered",
             "0.0500 px per axis",
         ] {
             assert!(text.contains(part), "{part:?} is not in:\n{text}");
         }
+        if let Some(held_out) = &mut calibration.held_out {
+            held_out.failed_folds = 1;
+            held_out.fold_failures = vec![FailedFold {
+                fold: 3,
+                reason: "too dark".to_owned(),
+            }];
+        }
+        let text = summary(&calibration, None);
+        assert!(text.contains("5 folds by pose; 1 more gave no estimate: too dark)"));
         calibration.held_out = None;
         assert!(summary(&calibration, None).contains("not checked"));
     }

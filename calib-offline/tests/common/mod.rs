@@ -171,7 +171,9 @@ pub fn calibration() -> Calibration {
             corners_used: 0,
             corners_rejected: 0,
         },
+        choices: None,
         held_out: None,
+        checks: None,
         verdict: Verdict {
             grade: Grade::Pass,
             reasons: Vec::new(),

@@ -1,0 +1,93 @@
+//! What would be lost if every camera were taken to have one center of projection.
+
+use super::working_volume::{Match, PointDifference, compare};
+use crate::field::Rig;
+use crate::joint::{Alternative, Choice, Estimate};
+use serde::{Deserialize, Serialize};
+
+/// The cost of a central model.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CentralModel {
+    /// Nothing: every camera is central.
+    IsCentral {
+        /// Twice the log evidence that offsets would have gained, below 0 if they lose; `None` if
+        /// the data leave them open.
+        offsets_gain: Option<f64>,
+    },
+    /// The rig was estimated again without offsets.
+    Costs {
+        /// Twice the log evidence lost.
+        evidence_loss: f64,
+        /// How far points of the volume with boards move, a rigid motion apart; `None` for one
+        /// camera, which measures none.
+        points: Option<PointDifference>,
+    },
+    /// Without offsets there is no estimate.
+    NoEstimate,
+}
+
+/// Estimates without offsets, and compares.
+///
+/// Cost: a few rounds of the estimate; none for a central rig.
+pub fn central_model(estimate: &Estimate, rig: &Rig, matches: &[Match]) -> CentralModel {
+    if rig.cameras.iter().all(|camera| camera.field.is_central()) {
+        return CentralModel::IsCentral {
+            offsets_gain: offsets_gain(&estimate.choices),
+        };
+    }
+    let central = estimate.made_central().ok();
+    let Some(central) = central.filter(|central| central.evidence_loss.is_finite()) else {
+        return CentralModel::NoEstimate;
+    };
+    let names: Vec<String> = rig.cameras.iter().map(|c| c.name.clone()).collect();
+    let central_rig = central.estimate.rig(&names);
+    CentralModel::Costs {
+        evidence_loss: central.evidence_loss,
+        points: compare(rig, &central_rig, matches).map(|compared| compared.difference),
+    }
+}
+
+/// What offsets would have gained a rig that ended without them.
+fn offsets_gain(choices: &[Choice]) -> Option<f64> {
+    // Where there are two offers, the later stands: the earlier was against a spline.
+    let offered = choices.iter().rev().find(|choice| {
+        let of_offsets = [Alternative::Offsets, Alternative::OffsetsForSpline];
+        of_offsets.contains(&choice.tried)
+    })?;
+    if !offered.taken {
+        return offered.gain;
+    }
+    // They were taken at first, and each was dropped later with a gain of its own.
+    let dropped = choices
+        .iter()
+        .filter(|choice| choice.taken && matches!(choice.tried, Alternative::Central { .. }));
+    dropped
+        .map(|choice| choice.gain)
+        .sum::<Option<f64>>()
+        .map(|gain| -gain)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn offsets_that_were_dropped_again_lose_what_dropping_gained() {
+        let choice = |tried, gain, taken| Choice {
+            tried,
+            gain: Some(gain),
+            taken,
+        };
+        let refused = [choice(Alternative::Offsets, -7.0, false)];
+        assert_eq!(offsets_gain(&refused), Some(-7.0));
+        let dropped = [
+            choice(Alternative::Offsets, 30.0, true),
+            choice(Alternative::Central { camera_idx: 0 }, -12.0, false),
+            choice(Alternative::Central { camera_idx: 0 }, 2.0, true),
+            choice(Alternative::Central { camera_idx: 1 }, -1.0, true),
+        ];
+        assert_eq!(offsets_gain(&dropped), Some(-1.0));
+        assert_eq!(offsets_gain(&[]), None);
+    }
+}

@@ -1,0 +1,290 @@
+//! Two calibrations from two halves of the poses: do they differ as much as they say they may?
+//!
+//! Both halves triangulate the same exact pixels, so noise of the pixels has no part in it, and the
+//! rigid motion between the two rigs is taken out. A camera alone measures no points; its rays are
+//! compared where they pass at the working distance. What remains has a predicted covariance, the
+//! sum of both halves' own. A ratio above what chance allows means that the estimate does not know
+//! how uncertain it is: errors that go together, a model that does not fit, a board or camera that
+//! moved. What both halves have in common cancels and is **not** seen: a wrong square size, a
+//! board that bends the same way in every pose, a camera that moved once between two placements.
+//!
+//! The prediction counts what smoothness holds as uncertain in each half, but both halves hold it
+//! alike: where the lens has detail that the data hardly determine, the ratio falls below 1. On
+//! simulated rigs (8 draws each, BENCHMARKS.md) its RMS is 0.98 for a plain lens, 1.02 behind flat
+//! ports, 0.72 with weak and 0.60 with strong local distortion.
+
+use super::working_volume::{Match, compare, lattice, matches_at};
+use crate::field::{RayField, Rig, transport};
+use crate::geometry::PixelPoint;
+use crate::joint::Estimate;
+use crate::joint::point_covariance::{across_motions, without_motions};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+
+/// Fewer poses are not halved: five hold no flexible field.
+pub const MIN_POSES: usize = 10;
+/// Quantile of the standard normal distribution: 95 % lie within so many standard deviations.
+const NORMAL_95: f64 = 1.96;
+
+/// The check, or why there is none.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum HalfDataCheck {
+    /// It was made.
+    Compared(HalfData),
+    /// It was not.
+    Skipped(Skipped),
+}
+
+/// Why the halves were not compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Skipped {
+    /// Nobody asked for it.
+    NotWanted,
+    /// Fewer poses than [`MIN_POSES`].
+    TooFewPoses {
+        /// How many there are.
+        have: usize,
+        /// How many it takes.
+        need: usize,
+    },
+    /// A half of the poses leaves a parameter open.
+    NoEstimate,
+    /// The halves have no calibrated pixels in common that see the same points.
+    NoCommonPoints,
+}
+
+/// What two halves of the poses say of each other.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct HalfData {
+    /// Poses of each half.
+    pub poses: [usize; 2],
+    /// Points compared, at the working distance; of a camera alone, rays where they pass there.
+    pub points: usize,
+    /// RMS distance between the two halves' points (or rays), mm.
+    pub difference_rms_mm: f64,
+    /// What it was to be by both halves' covariances, mm.
+    pub predicted_rms_mm: f64,
+    /// The first over the second.
+    pub ratio: f64,
+    /// Number of independent ways in which the difference can vary, to judge the ratio by: few, as
+    /// a field errs smoothly.
+    pub modes: f64,
+    /// Where the ratio falls by chance in 95 of 100 cases if the covariances are right.
+    pub ratio_by_chance: [f64; 2],
+}
+
+impl HalfData {
+    /// Whether the halves differ by more than chance explains.
+    pub fn is_larger(&self) -> bool {
+        self.ratio > self.ratio_by_chance[1]
+    }
+
+    /// Whether they differ by less.
+    pub fn is_smaller(&self) -> bool {
+        self.ratio < self.ratio_by_chance[0]
+    }
+}
+
+/// Number of points or rays, RMS of their difference (mm) and its predicted covariance (mm^2).
+type Differing = (usize, f64, DMatrix<f64>);
+
+/// The two halves of some poses.
+#[derive(Debug)]
+pub struct Halves {
+    /// Their estimates.
+    pub estimates: [Estimate; 2],
+    /// The rigs that these gave.
+    pub rigs: [Rig; 2],
+}
+
+/// Which poses are in the first half: every other one of each placement, in the order of their
+/// numbers, so that both halves have all angles and all placements. Poses without a placement
+/// count as one.
+pub fn first_half(
+    poses: impl IntoIterator<Item = usize>,
+    placement: impl Fn(usize) -> Option<usize>,
+) -> BTreeSet<usize> {
+    let poses: BTreeSet<usize> = poses.into_iter().collect();
+    let mut by_placement: Vec<usize> = poses.into_iter().collect();
+    by_placement.sort_by_key(|pose| (placement(*pose), *pose));
+    by_placement.into_iter().step_by(2).collect()
+}
+
+/// Estimates both halves, as `Estimate::of_poses` does.
+///
+/// Cost: less than one estimate, the two in parallel.
+///
+/// # Errors
+/// Why there are none.
+pub fn estimate_halves(estimate: &Estimate, first: &BTreeSet<usize>) -> Result<Halves, Skipped> {
+    if estimate.pose_count() < MIN_POSES {
+        return Err(Skipped::TooFewPoses {
+            have: estimate.pose_count(),
+            need: MIN_POSES,
+        });
+    }
+    let mut estimates: Vec<Estimate> = [true, false]
+        .into_par_iter()
+        .map(|half| estimate.of_poses(|pose| first.contains(&pose) == half).ok())
+        .collect::<Option<_>>()
+        .ok_or(Skipped::NoEstimate)?;
+    let (Some(b), Some(a)) = (estimates.pop(), estimates.pop()) else {
+        return Err(Skipped::NoEstimate);
+    };
+    let names: Vec<String> = (0..a.model.cameras.len()).map(|k| k.to_string()).collect();
+    let rigs = [a.rig(&names), b.rig(&names)];
+    Ok(Halves {
+        estimates: [a, b],
+        rigs,
+    })
+}
+
+impl Halves {
+    /// Compares the points of both halves at a distance of the whole estimate's first camera; of a
+    /// camera alone, its rays.
+    ///
+    /// # Errors
+    /// Why there is nothing to compare.
+    pub fn compared(&mut self, whole: &Rig, distance_mm: f64) -> Result<HalfData, Skipped> {
+        let (points, difference_rms_mm, covariance) = if whole.cameras.len() > 1 {
+            self.points(whole, distance_mm)?
+        } else {
+            self.rays(whole, distance_mm)?
+        };
+        let total = covariance.trace();
+        let modes = total * total / covariance.norm_squared();
+        let predicted_rms_mm = (total / points as f64).sqrt();
+        let ratio = difference_rms_mm / predicted_rms_mm;
+        if !ratio.is_finite() {
+            return Err(Skipped::NoCommonPoints);
+        }
+        Ok(HalfData {
+            poses: [0, 1].map(|k| self.estimates[k].pose_count()),
+            points,
+            difference_rms_mm,
+            predicted_rms_mm,
+            ratio,
+            modes,
+            ratio_by_chance: [-NORMAL_95, NORMAL_95].map(|z| ratio_quantile(modes, z)),
+        })
+    }
+
+    /// Number of points compared, RMS of their difference, and its covariance.
+    fn points(&mut self, whole: &Rig, distance_mm: f64) -> Result<Differing, Skipped> {
+        let matches = matches_at(whole, &[distance_mm]);
+        let [rig_a, rig_b] = &self.rigs;
+        let compared = compare(rig_a, rig_b, &matches).ok_or(Skipped::NoCommonPoints)?;
+        let covariance = self
+            .predicted(&compared.matches, &compared.first_from_second.rotation)
+            .ok_or(Skipped::NoEstimate)?;
+        let difference = compared.difference;
+        Ok((difference.points, difference.rms_mm, covariance))
+    }
+
+    /// The same of the first camera's rays.
+    fn rays(&mut self, whole: &Rig, distance_mm: f64) -> Result<Differing, Skipped> {
+        let [rig_a, rig_b] = &self.rigs;
+        let cameras = (
+            whole.cameras.first(),
+            rig_a.cameras.first(),
+            rig_b.cameras.first(),
+        );
+        let (Some(camera), Some(a), Some(b)) = cameras else {
+            return Err(Skipped::NoCommonPoints);
+        };
+        let both = |pixel: &PixelPoint| a.coverage.contains(*pixel) && b.coverage.contains(*pixel);
+        let mut pixels = lattice(&camera.coverage, 1.0);
+        pixels.retain(both);
+        let apart = rays_apart(&a.field, &b.field, &pixels, distance_mm);
+        let apart = apart.ok_or(Skipped::NoCommonPoints)?;
+        let [estimate_a, estimate_b] = &mut self.estimates;
+        // Both covariances are along the axes across the same rays, whatever the rigs' frames.
+        let own = estimate_a.ray_covariance(rig_a, 0, &pixels, distance_mm);
+        let other = estimate_b.ray_covariance(rig_b, 0, &pixels, distance_mm);
+        let (Ok(Some(own)), Ok(Some(other))) = (own, other) else {
+            return Err(Skipped::NoEstimate);
+        };
+        let rms_mm = (apart.norm_squared() / pixels.len() as f64).sqrt();
+        Ok((pixels.len(), rms_mm, own + other))
+    }
+
+    /// Covariance of the difference, in the first half's frame.
+    fn predicted(
+        &mut self,
+        matches: &[Match],
+        first_from_second: &nalgebra::Matrix3<f64>,
+    ) -> Option<DMatrix<f64>> {
+        let [a, b] = &mut self.estimates;
+        let [rig_a, rig_b] = &self.rigs;
+        let mut sum = a.point_covariance(rig_a, matches).ok()??;
+        let other = b.point_covariance(rig_b, matches).ok()??;
+        for row in (0..sum.nrows()).step_by(3) {
+            for column in (0..sum.ncols()).step_by(3) {
+                let own = other.fixed_view::<3, 3>(row, column);
+                let mut target = sum.fixed_view_mut::<3, 3>(row, column);
+                target += first_from_second * own * first_from_second.transpose();
+            }
+        }
+        Some(sum)
+    }
+}
+
+/// How far the second field's rays pass from points on the first's, along the axes across the
+/// rays, the best rigid motion of the camera taken out, mm; `None` of too few pixels.
+fn rays_apart(
+    first: &RayField,
+    second: &RayField,
+    pixels: &[PixelPoint],
+    distance_mm: f64,
+) -> Option<DVector<f64>> {
+    let mut apart = DVector::zeros(2 * pixels.len());
+    let mut motions = DMatrix::zeros(2 * pixels.len(), 6);
+    for (k, pixel) in pixels.iter().enumerate() {
+        let ray = first.ray(*pixel);
+        let point = ray.origin_mm + ray.direction.normalize() * distance_mm;
+        let sample = second.sample(*pixel);
+        let axes = transport::across(&sample.s);
+        apart
+            .fixed_rows_mut::<2>(2 * k)
+            .copy_from(&(axes.tr_mul(&point) - sample.m_mm));
+        let across = across_motions(&axes, &point);
+        motions.view_mut((2 * k, 0), (2, 6)).copy_from(&across);
+    }
+    Some(without_motions(&motions)? * apart)
+}
+
+/// Quantile of the ratio of an RMS to its expectation at `z` standard deviations, for a sum of
+/// squares with so many independent modes (Wilson and Hilferty's form of chi-square).
+fn ratio_quantile(modes: f64, z: f64) -> f64 {
+    let spread = 2.0 / (9.0 * modes);
+    (1.0 - spread + z * spread.sqrt()).max(0.0).powf(1.5)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halves_alternate_within_placements_and_are_even() {
+        // Two placements of five, recorded in turn.
+        let half = first_half(0..10, |pose| Some(pose % 2));
+        assert_eq!(half, BTreeSet::from([0, 4, 8, 3, 7]));
+        let free = first_half([9, 3, 5, 3], |_| None);
+        assert_eq!(free, BTreeSet::from([3, 9]));
+    }
+
+    #[test]
+    fn chance_is_that_of_chi_square() {
+        // Chi-square of 10: 2.5 % lie below 3.247 and 2.5 % above 20.483.
+        assert!((ratio_quantile(10.0, -NORMAL_95) - 0.3247_f64.sqrt()).abs() < 3e-3);
+        assert!((ratio_quantile(10.0, NORMAL_95) - 2.0483_f64.sqrt()).abs() < 3e-3);
+        // One mode: a normal variable's size, 2.241 (the formula gives 2.22).
+        assert!((ratio_quantile(1.0, NORMAL_95) - 2.241).abs() < 0.03);
+        assert!(ratio_quantile(1.0, -NORMAL_95) < 0.04);
+    }
+}

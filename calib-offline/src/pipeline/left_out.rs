@@ -1,0 +1,130 @@
+//! What did not go into the estimate as it was recorded, and why, for the record.
+
+use super::summary::Parts;
+use crate::detect::verdict::Outcome;
+use crate::init::screening::{Finding, FindingKind};
+use crate::report::record::{LeftOut, Renumbered};
+
+/// Poses, views and corners that did not go in.
+pub fn left_out(parts: &Parts, names: &[String]) -> Vec<LeftOut> {
+    let mut list: Vec<LeftOut> = Vec::new();
+    for pose in &parts.dataset.excluded_poses {
+        let corner_count = parts
+            .corners
+            .views
+            .iter()
+            .filter(|view| view.pose == *pose)
+            .map(|view| view.corners.len())
+            .sum();
+        list.push(LeftOut {
+            pose: *pose,
+            camera: None,
+            corner_count,
+            reason: "excluded by the user".to_string(),
+        });
+    }
+    let estimate = parts.estimate;
+    for (pose_idx, pose) in parts.observations.poses.iter().enumerate() {
+        let is_named = parts.findings.iter().any(|finding| finding.pose == *pose);
+        if !is_named && estimate.observations.poses.binary_search(pose).is_err() {
+            let views = parts.observations.views.iter();
+            list.push(LeftOut {
+                pose: *pose,
+                camera: None,
+                corner_count: views
+                    .filter(|view| view.pose_idx == pose_idx)
+                    .map(|view| view.corners.len())
+                    .sum(),
+                reason: "no camera sees enough of the board to place it".to_string(),
+            });
+        }
+    }
+    for (view, weights) in estimate
+        .observations
+        .views
+        .iter()
+        .zip(&estimate.robust_weights)
+    {
+        let rejected = weights.iter().filter(|weight| **weight == 0.0).count();
+        if rejected > 0 {
+            list.push(LeftOut {
+                pose: estimate.observations.poses[view.pose_idx],
+                camera: Some(names[view.camera_idx].clone()),
+                corner_count: rejected,
+                reason: format!(
+                    "{rejected} of {} corners rejected as outliers",
+                    weights.len()
+                ),
+            });
+        }
+    }
+    list.extend(parts.findings.iter().filter_map(|f| screened_out(f, names)));
+    for image in parts.corners.detection.iter().flat_map(|d| &d.images) {
+        if let Outcome::Refused(refusal) = &image.outcome {
+            list.push(LeftOut {
+                pose: image.pose,
+                camera: Some(names[image.camera_idx].clone()),
+                corner_count: 0,
+                reason: refusal.to_string(),
+            });
+        }
+    }
+    list
+}
+
+/// What the screening left out; `None` for a view that is used as it should be.
+fn screened_out(finding: &Finding, names: &[String]) -> Option<LeftOut> {
+    let (corner_count, reason) = match &finding.kind {
+        FindingKind::Misfit {
+            median_px,
+            typical_px,
+        } => (
+            finding.corner_count,
+            format!(
+                "the whole view misses by {median_px:.2} px (median; {typical_px:.2} px in other \
+                 views): the board moved during the exposure, is bent, or is another one"
+            ),
+        ),
+        FindingKind::Unsynchronized {
+            other_camera_idx,
+            misfit_px,
+            typical_px,
+        } => (
+            0,
+            format!(
+                "not the same board position as in camera {} ({misfit_px:.2} px apart, other pairs \
+                 {typical_px:.2} px): not exposed at the same instant; left out as a pair, each \
+                 view used for its own camera",
+                names[*other_camera_idx]
+            ),
+        ),
+        FindingKind::Renumbered { .. } => return None,
+    };
+    Some(LeftOut {
+        pose: finding.pose,
+        camera: Some(names[finding.camera_idx].clone()),
+        corner_count,
+        reason,
+    })
+}
+
+/// Views whose board was numbered from the other end.
+pub fn renumbered(findings: &[Finding], names: &[String]) -> Vec<Renumbered> {
+    findings
+        .iter()
+        .filter_map(|finding| match &finding.kind {
+            FindingKind::Renumbered {
+                other_camera_idx, ..
+            } => Some(Renumbered {
+                pose: finding.pose,
+                camera: names[finding.camera_idx].clone(),
+                reason: format!(
+                    "numbered from the other end of the board than in camera {}; renumbered, and \
+                     used",
+                    names[*other_camera_idx]
+                ),
+            }),
+            _ => None,
+        })
+        .collect()
+}
