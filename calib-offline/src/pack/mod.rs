@@ -3,7 +3,8 @@
 //! Each camera's ray field is resampled onto one control grid (`grid`), the coarsest that holds
 //! the bound (`budget`); the bytes are laid out by the runtime's own schema (`encode`); and
 //! every pixel of the calibrated area is looked up in those bytes by the real runtime and
-//! compared with the f64 field (`proof`). The largest difference is written into the blob.
+//! compared with the f64 field (`proof`). The largest difference is written into the blob. What is
+//! known of the rays' uncertainty goes with it, on a coarse grid (`uncertainty`).
 
 mod aligned_bytes;
 mod banded;
@@ -14,11 +15,13 @@ mod grid;
 mod nearest;
 mod proof;
 mod self_test;
+mod uncertainty;
 
 pub use aligned_bytes::{AlignedBytes, read_aligned};
 pub use grid::ControlGrid;
 pub use nearest::pack_nearest;
 pub use proof::Proof;
+pub use uncertainty::{Deviation, PackedPair};
 
 use crate::field::Rig;
 use crate::geometry::{PixelPoint, SensorSize};
@@ -36,15 +39,18 @@ pub struct PackSettings {
     pub working_distance_mm: f64,
     /// First bytes of the hash that identifies the calibration.
     pub identity: [u8; IDENTITY_LEN],
+    /// Whether the blob carries what is known of the rays' uncertainty, some 600 bytes a pair.
+    pub with_uncertainty: bool,
 }
 
 impl Default for PackSettings {
-    /// 0.001 px at 1 m, and an identity of zeros.
+    /// 0.001 px at 1 m, an identity of zeros, and the uncertainty.
     fn default() -> Self {
         Self {
             max_error_px: 0.001,
             working_distance_mm: 1000.0,
             identity: [0; IDENTITY_LEN],
+            with_uncertainty: true,
         }
     }
 }
@@ -58,6 +64,8 @@ pub struct Packed {
     pub worst_error_px: f64,
     /// One for each camera, in the rig's order.
     pub grids: Vec<PackedGrid>,
+    /// One for each pair of cameras whose uncertainty the blob carries.
+    pub pairs: Vec<PackedPair>,
     /// What other sizes would cost: bytes of the tables of all cameras, and the worst error, px.
     /// From small to large; each holds a smaller error than the one before. The errors are
     /// those of a sample of the pixels.
@@ -144,6 +152,14 @@ pub enum PackError {
         /// Cells along u and v.
         cells: [u32; 2],
     },
+    /// What a calibration says of a pair's uncertainty is no covariance.
+    #[error("the uncertainty of cameras {first} and {second} is not a covariance")]
+    Uncertainty {
+        /// Index of the first camera.
+        first: usize,
+        /// Index of the second.
+        second: usize,
+    },
     /// No grid holds the bound.
     #[error(
         "camera `{camera}` cannot be packed within {wanted_px} px: \
@@ -194,6 +210,11 @@ pub fn pack(rig: &Rig, settings: &PackSettings) -> Result<Packed, PackError> {
         max_error_px: settings.max_error_px as f32,
         working_distance_mm: settings.working_distance_mm as f32,
         self_tests: Vec::new(),
+        pairs: if settings.with_uncertainty {
+            uncertainty::sections(rig)?
+        } else {
+            Vec::new()
+        },
     };
     // The search looked at a sample of the pixels. Now all; a camera that fails gets a finer grid.
     let proofs = loop {
@@ -230,9 +251,10 @@ pub fn pack(rig: &Rig, settings: &PackSettings) -> Result<Packed, PackError> {
         .fold(0.0, |worst, p| p.worst_error_px.max(worst));
     parts.max_error_px = encode::rounded_up(worst_error_px);
     let bytes = parts.encode(rig, chosen.iter().map(|choice| &choice.grid))?;
-    RayBlob::open(&AlignedBytes::from(bytes.as_slice()))?
-        .run_self_tests()
-        .map_err(PackError::SelfTest)?;
+    let aligned = AlignedBytes::from(bytes.as_slice());
+    let blob = RayBlob::open(&aligned)?;
+    blob.run_self_tests().map_err(PackError::SelfTest)?;
+    let pairs = uncertainty::compare(rig, &blob, settings.working_distance_mm);
 
     let tried: Vec<_> = chosen
         .iter()
@@ -257,6 +279,7 @@ pub fn pack(rig: &Rig, settings: &PackSettings) -> Result<Packed, PackError> {
         bytes,
         worst_error_px,
         grids,
+        pairs,
         curve,
     })
 }
