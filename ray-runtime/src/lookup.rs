@@ -25,6 +25,9 @@ pub(crate) fn lookup(
 }
 
 /// The ray of a pixel, the bits of [`lookup`], and how it moves with u and with v.
+///
+/// Neither this nor what it calls three times is inlined: it is for size, where lookup is for speed.
+#[inline(never)]
 pub(crate) fn lookup_moving(
     bytes: &[u8],
     words: &[f32],
@@ -36,23 +39,24 @@ pub(crate) fn lookup_moving(
     }
     let (window, u, v) = Window::at(record, pixel);
     let [cells_u, cells_v] = record.cells();
-    let slopes_u = record.axis_u().slopes(pixel.u, cells_u);
-    let slopes_v = record.axis_v().slopes(pixel.v, cells_v);
-    let along_u = |knots| blend(u.weights, knots);
-    let along_v = |knots| blend(v.weights, knots);
-    let change_u = |knots| blend_slopes(slopes_u, knots);
-    let change_v = |knots| blend_slopes(slopes_v, knots);
-    let evaluated = [
-        window.evaluate(words, along_u, along_v),
-        window.evaluate(words, change_u, along_v),
-        window.evaluate(words, along_u, change_v),
-    ];
+    let [value_u, value_v] = [u, v].map(|place| Weights {
+        of_knot_1: 1.0,
+        of_differences: place.weights,
+    });
+    let slope = |of_differences| Weights {
+        of_knot_1: 0.0,
+        of_differences,
+    };
+    let slope_u = slope(record.axis_u().slopes(pixel.u, cells_u));
+    let slope_v = slope(record.axis_v().slopes(pixel.v, cells_v));
+    let evaluated = [(value_u, value_v), (slope_u, value_v), (value_u, slope_v)]
+        .map(|(along_u, along_v)| window.evaluate_weighted(words, along_u, along_v));
     let [Some(sample), Some(by_u), Some(by_v)] = evaluated else {
         return Err(LookupError::Outside);
     };
     Ok(MovingRay {
         ray: ray(record, sample),
-        by_pixel: [by_u, by_v].map(|change| slope(record.rotation(), sample, change)),
+        by_pixel: [by_u, by_v].map(|change| differential(record.rotation(), sample, change)),
     })
 }
 
@@ -82,6 +86,20 @@ fn ray(record: Record<'_>, [s1, s2, m1, m2]: [f32; 4]) -> Ray {
     Ray {
         origin_mm,
         direction: direction(rotation, [s1, s2]),
+    }
+}
+
+/// Weights along one axis, of a place or of its derivative.
+#[derive(Debug, Clone, Copy)]
+struct Weights {
+    /// 1 for the place, 0 for the derivative: exact either way.
+    of_knot_1: f32,
+    of_differences: [f32; 3],
+}
+
+impl Weights {
+    fn applied_to(self, knots: [f32; 4]) -> f32 {
+        self.of_knot_1 * knots[1] + blend_slopes(self.of_differences, knots)
     }
 }
 
@@ -126,6 +144,21 @@ impl Window {
         } else {
             self.channels::<4, 16>(words, along_u, along_v)
         }
+    }
+
+    /// The same with weights that are known only when it is called.
+    #[inline(never)]
+    fn evaluate_weighted(
+        self,
+        words: &[f32],
+        along_u: Weights,
+        along_v: Weights,
+    ) -> Option<[f32; 4]> {
+        self.evaluate(
+            words,
+            |knots| along_u.applied_to(knots),
+            |knots| along_v.applied_to(knots),
+        )
     }
 
     /// `ROW` is `4 * CHANNELS`.
@@ -196,7 +229,7 @@ fn origin(r: [f32; 9], t: [f32; 3], [s1, s2]: [f32; 2], [m1, m2]: [f32; 2]) -> V
 
 /// How a ray moves when a sample of the control grid changes, both parts per unit of the change:
 /// the differential of [`direction`] and [`origin`].
-fn slope(r: [f32; 9], [s1, s2, m1, m2]: [f32; 4], [ds1, ds2, dm1, dm2]: [f32; 4]) -> Ray {
+fn differential(r: [f32; 9], [s1, s2, m1, m2]: [f32; 4], [ds1, ds2, dm1, dm2]: [f32; 4]) -> Ray {
     let difference = 0.25 * (s2 * s2 - s1 * s1);
     let product = -0.5 * (s1 * s2);
     let difference_change = 0.5 * (s2 * ds2 - s1 * ds1);
@@ -261,7 +294,7 @@ mod tests {
                 )
             };
             let (low, high) = (at(-h), at(h));
-            let found = slope(turn, sample, change);
+            let found = differential(turn, sample, change);
             // Origin and direction are quadratic in s: central differences are exact.
             let error = (high.0 - low.0) / (2.0 * h) - found.origin_mm;
             assert!(error.norm() < 1e-4, "{channel}: {error}");
