@@ -12,5 +12,5 @@ pub mod uncertainty;
 
 pub use coverage::CoverageMask;
 pub use ray_field::{BaseLens, FieldSample, Projection, RayField, SmoothMap};
-pub use rig::{CalibratedCamera, MeasureError, Rig};
+pub use rig::{CalibratedCamera, MeasureError, PointCovariance, Rig};
 pub use uncertainty::PairUncertainty;
