@@ -203,8 +203,9 @@ impl<'a> RayBlob<'a> {
     /// [`RayBlob::triangulate`] with the covariance of the point, rig frame. The cameras may come in
     /// either order.
     ///
-    /// The point's bits are those of `triangulate`. It costs about four of them: the rays are
-    /// looked up with their derivatives. Whoever does not call it has none of it linked.
+    /// The point's bits are those of `triangulate`. It costs about three and a half of them, as the
+    /// rays are looked up with their derivatives. Whoever does not call it has none of it linked but
+    /// what checks the blob.
     ///
     /// # Errors
     /// Those of `triangulate`.
