@@ -196,9 +196,10 @@ fn inspect_and_pack_say_what_the_uncertainty_is_and_costs() {
 
 #[test]
 fn an_uncertainty_that_is_none_is_refused() {
+    type Spoil = fn(&mut PairUncertainty);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("calibration.json");
-    let spoils: [(fn(&mut PairUncertainty), &str); 5] = [
+    let spoils: [(Spoil, &str); 5] = [
         (|u| u.second = 2, "wrong length"),
         (|u| u.nodes_u = 4, "wrong length"),
         (|u| u.nodes_v = usize::MAX, "wrong length"),

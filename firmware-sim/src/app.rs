@@ -1,7 +1,7 @@
 //! The device application: opens the blob in its flash once, then answers.
 
 use heapless::Vec;
-use ray_runtime::{OpenError, PixelPoint, RayBlob};
+use ray_runtime::{MeasureError, OpenError, PixelPoint, RayBlob};
 
 use crate::port::{BlobStore, Clock};
 use crate::protocol::{
@@ -131,7 +131,7 @@ fn measure_one(blob: &RayBlob<'_>, asked: &Match) -> Measured {
     let outcome = blob.triangulate_with_covariance(pixel_of(asked.first), pixel_of(asked.second));
     Measured {
         id: asked.id,
-        outcome: outcome.map(Point::from).map_err(|error| error.code()),
+        outcome: outcome.map(Point::from).map_err(MeasureError::code),
     }
 }
 

@@ -11,7 +11,7 @@ use firmware_sim::host::{FLASH_LENGTH, SimulatedDevice};
 use firmware_sim::protocol::{Match, Point, Refusal};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use ray_runtime::{Aligned, OpenError, PixelPoint, RayBlob};
+use ray_runtime::{Aligned, MeasureError, OpenError, PixelPoint, RayBlob};
 
 fn device(flash: &[u8]) -> (SimulatedDevice, DeviceClient) {
     let device = SimulatedDevice::start("127.0.0.1:0".parse().unwrap(), flash).unwrap();
@@ -29,7 +29,7 @@ fn expected(blob: &RayBlob<'_>, asked: &Match) -> Result<Point, u8> {
     };
     blob.triangulate_with_covariance(pixel(asked.first), pixel(asked.second))
         .map(Point::from)
-        .map_err(|error| error.code())
+        .map_err(MeasureError::code)
 }
 
 #[test]

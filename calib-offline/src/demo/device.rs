@@ -8,7 +8,7 @@ use firmware_sim::client::{ClientError, DeviceClient};
 use firmware_sim::host::SimulatedDevice;
 use firmware_sim::protocol::{Match, Point};
 use firmware_sim::qemu::{QemuDevice, QemuError, image_path, require_qemu};
-use ray_runtime::{PixelPoint, RayBlob};
+use ray_runtime::{MeasureError, PixelPoint, RayBlob};
 use serde::Serialize;
 use std::collections::HashMap;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -103,7 +103,7 @@ fn on_host(blob: &RayBlob<'_>, pair: &Pair) -> Result<Point, u8> {
     let [first, second] = pair.map(|(camera_idx, [u, v])| (camera_idx, PixelPoint::new(u, v)));
     blob.triangulate_with_covariance(first, second)
         .map(Point::from)
-        .map_err(|error| error.code())
+        .map_err(MeasureError::code)
 }
 
 fn bits(outcome: &Result<Point, u8>) -> Result<[Option<u32>; 7], u8> {
