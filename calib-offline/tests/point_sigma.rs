@@ -195,6 +195,48 @@ fn inspect_and_pack_say_what_the_uncertainty_is_and_costs() {
 }
 
 #[test]
+fn pairs_of_three_cameras_stand_in_order_and_are_told_apart() {
+    let mut rig = with_uncertainty().rig;
+    let mut third = rig.cameras[1].clone();
+    third.name = "third".to_owned();
+    rig.cameras.push(third);
+    let mut with_third = rig.uncertainty[0].clone();
+    with_third.second = 2;
+    // Twice the size of the other pair's standard deviations.
+    for node in &mut with_third.calibration_px2 {
+        *node = node.map(|x| 4.0 * x);
+    }
+    with_third.noise_px2 *= 4.0;
+    rig.uncertainty.insert(0, with_third);
+    let settings = PackSettings {
+        max_error_px: 0.002,
+        ..PackSettings::default()
+    };
+    let bytes = pack(&rig, &settings).unwrap().bytes;
+    let bytes = AlignedBytes::from(bytes.as_slice());
+    let blob = RayBlob::open(&bytes).unwrap();
+    let pairs: Vec<_> = blob.uncertain_pairs().map(|pair| pair.cameras).collect();
+    assert_eq!(pairs, [[0, 1], [0, 2]]);
+
+    let source = BlobSource::new(&blob, None).unwrap();
+    let seen = [0, 1, 1].map(|camera| project(&rig, camera, &Vector3::zeros()));
+    let seen = seen.map(|pixel| [pixel.u as f32, pixel.v as f32]);
+    let sigma = |cameras: &[usize]| {
+        let sightings: Vec<_> = cameras.iter().map(|k| (*k, seen[*k])).collect();
+        source.point(&sightings).map(|point| point.sigma_mm)
+    };
+    let (near, far) = (
+        sigma(&[0, 1]).unwrap().unwrap(),
+        sigma(&[2, 0]).unwrap().unwrap(),
+    );
+    for (near, far) in near.into_iter().zip(far) {
+        assert!((far / near - 2.0).abs() < 1e-3, "{near} {far}");
+    }
+    // More than two rays give a point, but of them nothing is known.
+    assert_eq!(sigma(&[0, 1, 2]), Ok(None));
+}
+
+#[test]
 fn an_uncertainty_that_is_none_is_refused() {
     type Spoil = fn(&mut PairUncertainty);
     let folder = tempfile::tempdir().unwrap();
