@@ -17,10 +17,12 @@ use ray_runtime::RayBlob;
 use std::fs;
 use std::path::Path;
 
-/// What `ray-runtime/FORMAT.md` states: RMS and worst relative deviation of a standard deviation
-/// of a point from the calibration's.
+/// What `ray-runtime/FORMAT.md` states of smooth lenses: RMS and worst relative deviation of a
+/// standard deviation of a point from the calibration's.
 const STATED_RMS: f64 = 0.014;
-const STATED_WORST: f64 = 0.085;
+const STATED_WORST: f64 = 0.11;
+/// What it states of any lens, where more nodes can reach it.
+const MOST_RMS: f64 = 0.05;
 
 /// The points of a match list along each axis, in the rig's frame and in a camera's.
 fn assert_agreement(optics: OpticsKind) {
@@ -61,7 +63,7 @@ fn assert_agreement(optics: OpticsKind) {
     };
     assert!(pair.bytes <= 700, "{}", pair.bytes);
     assert!(pair.sigma_error.rms < STATED_RMS && pair.sigma_error.worst < STATED_WORST);
-    assert!(pair.calibration_sigma_error.rms < 0.055);
+    assert!(pair.calibration_sigma_error.rms < 0.08);
     // It can be left out, and then costs nothing.
     let without = PackSettings {
         with_uncertainty: false,
@@ -192,6 +194,28 @@ fn inspect_and_pack_say_what_the_uncertainty_is_and_costs() {
     );
     let stated = format!("{} of the bytes", pairs[0]["bytes"]);
     assert!(words.stdout.contains(&stated), "{}", words.stdout);
+}
+
+#[test]
+fn what_varies_from_node_to_node_gets_more_nodes() {
+    let mut rig = with_uncertainty().rig;
+    let uncertainty = &mut rig.uncertainty[0];
+    (uncertainty.nodes_u, uncertainty.nodes_v) = (9, 7);
+    // Nothing but the calibration's part, three times as large along every third column.
+    uncertainty.noise_px2 = 0.0;
+    uncertainty.calibration_px2 = (0..63)
+        .map(|k| if k % 9 % 3 == 0 { 0.0009 } else { 0.0001 })
+        .map(|px2| packed(&(Matrix4::identity() * px2)))
+        .collect();
+    let settings = PackSettings {
+        max_error_px: 0.002,
+        ..PackSettings::default()
+    };
+    let result = pack(&rig, &settings).unwrap();
+    let pair = &result.pairs[0];
+    println!("{pair:?}");
+    assert!(pair.nodes[0] > 8, "{pair:?}");
+    assert!(pair.sigma_error.rms < MOST_RMS, "{pair:?}");
 }
 
 #[test]

@@ -39,7 +39,7 @@ pub struct PackSettings {
     pub working_distance_mm: f64,
     /// First bytes of the hash that identifies the calibration.
     pub identity: [u8; IDENTITY_LEN],
-    /// Whether the blob carries what is known of the rays' uncertainty, some 600 bytes a pair.
+    /// Whether the blob carries what is known of the rays' uncertainty, 648 bytes a pair for smooth lenses.
     pub with_uncertainty: bool,
 }
 
@@ -210,11 +210,7 @@ pub fn pack(rig: &Rig, settings: &PackSettings) -> Result<Packed, PackError> {
         max_error_px: settings.max_error_px as f32,
         working_distance_mm: settings.working_distance_mm as f32,
         self_tests: Vec::new(),
-        pairs: if settings.with_uncertainty {
-            uncertainty::sections(rig)?
-        } else {
-            Vec::new()
-        },
+        pairs: Vec::new(),
     };
     // The search looked at a sample of the pixels. Now all; a camera that fails gets a finer grid.
     let proofs = loop {
@@ -241,20 +237,30 @@ pub fn pack(rig: &Rig, settings: &PackSettings) -> Result<Packed, PackError> {
             }
         }
         if is_proven {
-            parts.self_tests = self_test::ask(rig, &blob, settings.working_distance_mm);
             break proofs;
         }
     };
 
+    let grids = || chosen.iter().map(|choice| &choice.grid);
+    let distance_mm = settings.working_distance_mm;
+    let pairs = if settings.with_uncertainty {
+        uncertainty::choose(rig, distance_mm, |sections| {
+            parts.pairs = sections.to_vec();
+            parts.encode(rig, grids())
+        })?
+    } else {
+        Vec::new()
+    };
     let worst_error_px = proofs
         .iter()
         .fold(0.0, |worst, p| p.worst_error_px.max(worst));
     parts.max_error_px = encode::rounded_up(worst_error_px);
-    let bytes = parts.encode(rig, chosen.iter().map(|choice| &choice.grid))?;
-    let aligned = AlignedBytes::from(bytes.as_slice());
-    let blob = RayBlob::open(&aligned)?;
-    blob.run_self_tests().map_err(PackError::SelfTest)?;
-    let pairs = uncertainty::compare(rig, &blob, settings.working_distance_mm);
+    let unasked = AlignedBytes::from(parts.encode(rig, grids())?.as_slice());
+    parts.self_tests = self_test::ask(rig, &RayBlob::open(&unasked)?, distance_mm);
+    let bytes = parts.encode(rig, grids())?;
+    RayBlob::open(&AlignedBytes::from(bytes.as_slice()))?
+        .run_self_tests()
+        .map_err(PackError::SelfTest)?;
 
     let tried: Vec<_> = chosen
         .iter()

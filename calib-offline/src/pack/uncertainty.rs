@@ -1,17 +1,20 @@
 //! The uncertainty of pairs of cameras as a blob carries it: a coarse grid of Cholesky factors,
 //! one byte a number, and how far its predictions are from those of the calibration.
 
-use super::PackError;
+use super::{AlignedBytes, PackError};
 use crate::field::{CalibratedCamera, CoverageMask, PairUncertainty, Rig};
 use crate::geometry::PixelPoint;
 use nalgebra::{DMatrix, Matrix3, Matrix4};
 use ray_runtime::RayBlob;
 use ray_runtime::format::{NODE_LEN, PairHeader, TRIANGLE};
 
-/// Nodes along the longer side of the calibrated area. With eight the predicted standard deviation
-/// of a point is off by 1 % RMS or less on every rig tried (`BENCHMARKS.md`), and a pair takes
-/// some 600 bytes; the calibration itself knows no more than eleven along the sensor's longer side.
-const NODES_ALONG_LONGER_SIDE: f64 = 8.0;
+/// Nodes along the longer side of the calibrated area, tried in turn. Eight take 648 bytes for the
+/// usual sensor and are enough for smooth lenses; fields with strong local bumps are known here and
+/// not known there, and want more. The calibration itself has eleven along the sensor's longer
+/// side, so that sixteen add nothing but places that fit its own better.
+const NODES_ALONG_LONGER_SIDE: [f64; 3] = [8.0, 11.0, 16.0];
+/// More nodes are taken while the predicted standard deviation of a point is off by more, RMS.
+const MOST_SIGMA_ERROR: f64 = 0.05;
 /// Pull of every node towards the factor at its place, relative to that of the cells around it: it
 /// decides only where the calibrated area has no cells.
 const PULL: f64 = 1e-3;
@@ -52,29 +55,59 @@ pub struct Deviation {
     pub worst: f64,
 }
 
-/// The sections of a rig, in the blob's order.
+/// The sections of a rig in the blob's order, each with the fewest nodes that keep the error below
+/// [`MOST_SIGMA_ERROR`] or else with the most that are tried, and what they cost. `encode` makes a
+/// blob with the sections it is given.
 ///
 /// # Errors
-/// [`PackError::Uncertainty`] where a covariance is none.
-pub fn sections(rig: &Rig) -> Result<Vec<Vec<u8>>, PackError> {
+/// [`PackError::Uncertainty`] where a covariance is none, and those of `encode`.
+pub fn choose(
+    rig: &Rig,
+    working_distance_mm: f64,
+    mut encode: impl FnMut(&[Vec<u8>]) -> Result<Vec<u8>, PackError>,
+) -> Result<Vec<PackedPair>, PackError> {
     let mut pairs: Vec<&PairUncertainty> = rig.uncertainty.iter().collect();
     pairs.sort_by_key(|pair| (pair.first, pair.second));
-    pairs
-        .into_iter()
-        .map(|pair| {
-            let failed = || PackError::Uncertainty {
-                first: pair.first,
-                second: pair.second,
-            };
-            let first = rig.cameras.get(pair.first).ok_or_else(failed)?;
-            section(pair, &first.coverage).ok_or_else(failed)
-        })
-        .collect()
+    let mut tries = vec![0; pairs.len()];
+    loop {
+        let sections = pairs
+            .iter()
+            .zip(&tries)
+            .map(|(pair, tried)| {
+                let first = rig.cameras.get(pair.first);
+                first
+                    .and_then(|first| {
+                        section(pair, &first.coverage, NODES_ALONG_LONGER_SIDE[*tried])
+                    })
+                    .ok_or(PackError::Uncertainty {
+                        first: pair.first,
+                        second: pair.second,
+                    })
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let bytes = AlignedBytes::from(encode(&sections)?.as_slice());
+        let packed = compare(rig, &RayBlob::open(&bytes)?, working_distance_mm);
+        let mut is_chosen = true;
+        for (tried, pair) in tries.iter_mut().zip(&packed) {
+            let is_last = *tried + 1 == NODES_ALONG_LONGER_SIDE.len();
+            if pair.sigma_error.rms > MOST_SIGMA_ERROR && !is_last {
+                *tried += 1;
+                is_chosen = false;
+            }
+        }
+        if is_chosen {
+            return Ok(packed);
+        }
+    }
 }
 
 /// Header and nodes of a pair; `None` where a covariance is none.
-fn section(pair: &PairUncertainty, mask: &CoverageMask) -> Option<Vec<u8>> {
-    let grid = NodeGrid::over(mask)?;
+fn section(
+    pair: &PairUncertainty,
+    mask: &CoverageMask,
+    nodes_along_longer_side: f64,
+) -> Option<Vec<u8>> {
+    let grid = NodeGrid::over(mask, nodes_along_longer_side)?;
     let factors = fit(pair, mask, &grid)?;
     let largest_px = |factor: &[f64; TRIANGLE]| factor.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
     let step_px =
@@ -115,7 +148,7 @@ struct NodeGrid {
 
 impl NodeGrid {
     /// `None` if no cell is calibrated.
-    fn over(mask: &CoverageMask) -> Option<Self> {
+    fn over(mask: &CoverageMask, nodes_along_longer_side: f64) -> Option<Self> {
         let (width_px, height_px) = mask.cell_size_px();
         let covered = || (0..mask.covered.len()).filter(|cell| mask.covered[*cell]);
         let reach = |place: &dyn Fn(usize) -> usize, cell_px: f64| {
@@ -130,7 +163,7 @@ impl NodeGrid {
         let extent_px = [high_u - low_u, high_v - low_v];
         let longer_px = extent_px[0].max(extent_px[1]);
         let nodes = extent_px
-            .map(|px| ((NODES_ALONG_LONGER_SIDE * px / longer_px).round() as usize).max(2));
+            .map(|px| ((nodes_along_longer_side * px / longer_px).round() as usize).max(2));
         Some(Self {
             nodes,
             first_px: [low_u, low_v],
@@ -229,7 +262,7 @@ fn factor_px(covariance: &Matrix4<f64>) -> Option<[f64; TRIANGLE]> {
 
 /// Compares what the blob predicts with what the calibration predicts, for points at the working
 /// distance all over the first camera's image.
-pub fn compare(rig: &Rig, blob: &RayBlob<'_>, working_distance_mm: f64) -> Vec<PackedPair> {
+fn compare(rig: &Rig, blob: &RayBlob<'_>, working_distance_mm: f64) -> Vec<PackedPair> {
     blob.uncertain_pairs()
         .filter_map(|header| {
             let [first, second] = header.cameras.map(usize::from);
