@@ -4,7 +4,8 @@
 //! the bound (`budget`); the bytes are laid out by the runtime's own schema (`encode`); and
 //! every pixel of the calibrated area is looked up in those bytes by the real runtime and
 //! compared with the f64 field (`proof`). The largest difference is written into the blob. What is
-//! known of the rays' uncertainty goes with it, on a coarse grid (`uncertainty`).
+//! known of the rays' uncertainty goes with it, on a coarse grid (`uncertainty`) whose predictions are
+//! compared with the calibration's (`sigma_error`).
 
 mod aligned_bytes;
 mod banded;
@@ -15,13 +16,14 @@ mod grid;
 mod nearest;
 mod proof;
 mod self_test;
+mod sigma_error;
 mod uncertainty;
 
 pub use aligned_bytes::{AlignedBytes, read_aligned};
 pub use grid::ControlGrid;
 pub use nearest::pack_nearest;
 pub use proof::Proof;
-pub use uncertainty::{Deviation, PackedPair};
+pub use sigma_error::{Deviation, PackedPair};
 
 use crate::field::Rig;
 use crate::geometry::{PixelPoint, SensorSize};
