@@ -1,20 +1,21 @@
-//! The golden blob of format version 1: the packer writes today what it wrote then.
+//! The golden blob of format version 2: the packer writes today what it wrote then.
 //!
 //! `UPDATE_GOLDEN=1 cargo test --release -p calib-offline --test golden_blob` writes the file
 //! anew. That is right only if the packer was meant to change; a new format version gets a file
 //! of its own, and the old one stays.
 
 use calib_offline::field::spline::{Spline, SplineGrid};
+use calib_offline::field::uncertainty::packed;
 use calib_offline::field::{
-    BaseLens, CalibratedCamera, CoverageMask, Projection, RayField, Rig, SmoothMap,
+    BaseLens, CalibratedCamera, CoverageMask, PairUncertainty, Projection, RayField, Rig, SmoothMap,
 };
 use calib_offline::geometry::{PixelPoint, RigidTransform, SensorSize};
 use calib_offline::pack::{AlignedBytes, PackSettings, pack, read_aligned};
-use nalgebra::{Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix3, Matrix4, Vector2, Vector3};
 use ray_runtime::RayBlob;
 use std::path::Path;
 
-const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../data/golden/stereo-v1.rays");
+const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../data/golden/stereo-v2.rays");
 
 /// A rotation about y by an angle with this sine and cosine.
 fn yaw(sin: f64, cos: f64) -> Matrix3<f64> {
@@ -48,7 +49,7 @@ fn golden_rig() -> Rig {
     let hull = [(4.0, 3.0), (60.0, 5.0), (58.0, 44.0), (8.0, 40.0)];
     let corners = hull.iter().map(|(u, v)| PixelPoint::new(*u, *v));
     Rig {
-        uncertainty: Vec::new(),
+        uncertainty: vec![golden_uncertainty(sensor)],
         cameras: vec![
             CalibratedCamera {
                 name: "left".into(),
@@ -73,12 +74,36 @@ fn golden_rig() -> Rig {
     }
 }
 
+/// Larger to the right and downwards; the cameras' u go together.
+fn golden_uncertainty(sensor: SensorSize) -> PairUncertainty {
+    let node = |k: usize| {
+        let size = 0.02 + (k % 4) as f64 / 128.0 + (k / 4) as f64 / 256.0;
+        let factor = Matrix4::new(
+            2.0, 0.0, 0.0, 0.0, //
+            0.5, 1.5, 0.0, 0.0, //
+            1.5, 0.25, 1.0, 0.0, //
+            0.25, 1.25, -0.5, 1.0,
+        ) * size;
+        packed(&(factor * factor.transpose()))
+    };
+    PairUncertainty {
+        first: 0,
+        second: 1,
+        sensor,
+        nodes_u: 4,
+        nodes_v: 3,
+        calibration_px2: (0..12).map(node).collect(),
+        noise_px2: 0.0025,
+    }
+}
+
 #[test]
 fn the_packer_still_writes_the_golden_blob() {
     let settings = PackSettings {
         max_error_px: 0.002,
         working_distance_mm: 500.0,
-        identity: *b"golden stereo v1",
+        identity: *b"golden stereo v2",
+        ..PackSettings::default()
     };
     let packed = pack(&golden_rig(), &settings).unwrap();
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
@@ -101,6 +126,7 @@ fn the_packer_still_writes_the_golden_blob() {
         }
     }
     assert!(golden.self_tests().eq(fresh.self_tests()));
+    assert!(golden.uncertain_pairs().eq(fresh.uncertain_pairs()));
     assert_eq!(golden.max_error_px(), fresh.max_error_px());
     if golden.written_by() == fresh.written_by() {
         assert_eq!(std::fs::read(PATH).unwrap(), packed.bytes);

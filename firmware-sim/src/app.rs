@@ -1,7 +1,7 @@
 //! The device application: opens the blob in its flash once, then answers.
 
 use heapless::Vec;
-use ray_runtime::{OpenError, PixelPoint, RayBlob};
+use ray_runtime::{MeasureError, OpenError, PixelPoint, RayBlob};
 
 use crate::port::{BlobStore, Clock};
 use crate::protocol::{
@@ -128,16 +128,10 @@ fn measure_one(blob: &RayBlob<'_>, asked: &Match) -> Measured {
             PixelPoint::new(sighting.u_px, sighting.v_px),
         )
     };
-    let outcome = blob.triangulate(pixel_of(asked.first), pixel_of(asked.second));
+    let outcome = blob.triangulate_with_covariance(pixel_of(asked.first), pixel_of(asked.second));
     Measured {
         id: asked.id,
-        outcome: match outcome {
-            Ok(found) => Ok(Point {
-                point_mm: found.point_mm.into(),
-                gap_squared_mm2: found.gap_squared_mm2,
-            }),
-            Err(error) => Err(error.code()),
-        },
+        outcome: outcome.map(Point::from).map_err(MeasureError::code),
     }
 }
 

@@ -20,7 +20,7 @@ use crate::protocol::{PROTOCOL_VERSION, Refusal};
 /// Ends every frame.
 pub const DELIMITER: u8 = 0;
 
-/// Longest message: head, body and checksum, bytes. A full batch of matches takes below 900.
+/// Longest message: head, body and checksum, bytes. A full batch of points takes below 1000.
 pub const MAX_MESSAGE: usize = 1024;
 
 /// Longest frame on the wire, its delimiter included, bytes.

@@ -9,13 +9,14 @@
 //! Pixels have (0, 0) at the center of the top-left pixel; points are in the rig's frame, mm.
 
 use heapless::{String, Vec};
+use ray_runtime::Measurement;
 use serde::{Deserialize, Serialize};
 
 /// The protocol spoken here. It stands in every frame, and a device refuses any other.
-pub const PROTOCOL_VERSION: u8 = 1;
+pub const PROTOCOL_VERSION: u8 = 2;
 
-/// Matches in one [`Request::Measure`]: with 32 both messages stay below 1 KiB.
-pub const MAX_MATCHES: usize = 32;
+/// Matches in one [`Request::Measure`]: with 28 both messages stay below 1 KiB.
+pub const MAX_MATCHES: usize = 28;
 
 /// Cameras listed in a [`Status`]; a blob may hold more, [`BlobStatus::camera_count`] says how
 /// many.
@@ -93,8 +94,36 @@ pub struct Measured {
 pub struct Point {
     /// x, y, z in the rig's frame, mm.
     pub point_mm: [f32; 3],
-    /// Square of the length of the common perpendicular, mm². The device takes no square root.
+    /// Square of the length of the common perpendicular, mm². The device takes no square root of it.
     pub gap_squared_mm2: f32,
+    /// Predicted standard deviation along x, y and z of the rig's frame, mm: what the calibration
+    /// leaves uncertain, and pixel noise of the size of its corners'. `None` where the blob does
+    /// not say.
+    pub sigma_mm: Option<[f32; 3]>,
+}
+
+impl From<Measurement> for Point {
+    fn from(measured: Measurement) -> Self {
+        Self {
+            point_mm: measured.found.point_mm.into(),
+            gap_squared_mm2: measured.found.gap_squared_mm2,
+            sigma_mm: measured.covariance.map(|covariance| covariance.sigma_mm()),
+        }
+    }
+}
+
+impl Point {
+    /// The bits of the point, of the gap and, if there are any, of the standard deviations: what two
+    /// targets must agree on.
+    pub fn to_bits(&self) -> [Option<u32>; 7] {
+        let [x, y, z] = self.point_mm.map(|number| Some(number.to_bits()));
+        let [sigma_x, sigma_y, sigma_z] = match self.sigma_mm {
+            Some(sigma_mm) => sigma_mm.map(|number| Some(number.to_bits())),
+            None => [None; 3],
+        };
+        let gap = Some(self.gap_squared_mm2.to_bits());
+        [x, y, z, gap, sigma_x, sigma_y, sigma_z]
+    }
 }
 
 /// Who the device is and what it takes.

@@ -10,7 +10,7 @@ use firmware_sim::qemu;
 fn check_images_print_what_they_should() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("cortex-m/src/bin");
     let overwrite = std::env::var_os("OVERWRITE").is_some_and(|value| value == "1");
-    let flash = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/golden/stereo-v1.rays");
+    let flash = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/golden/stereo-v2.rays");
 
     let mut compared = 0;
     for entry in std::fs::read_dir(&folder).unwrap() {

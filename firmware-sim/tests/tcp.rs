@@ -8,10 +8,10 @@ use std::time::{Duration, Instant};
 
 use firmware_sim::client::{ClientError, DeviceClient};
 use firmware_sim::host::{FLASH_LENGTH, SimulatedDevice};
-use firmware_sim::protocol::{Match, Refusal};
+use firmware_sim::protocol::{Match, Point, Refusal};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use ray_runtime::{Aligned, OpenError, PixelPoint, RayBlob};
+use ray_runtime::{Aligned, MeasureError, OpenError, PixelPoint, RayBlob};
 
 fn device(flash: &[u8]) -> (SimulatedDevice, DeviceClient) {
     let device = SimulatedDevice::start("127.0.0.1:0".parse().unwrap(), flash).unwrap();
@@ -19,21 +19,17 @@ fn device(flash: &[u8]) -> (SimulatedDevice, DeviceClient) {
     (device, client)
 }
 
-/// What the runtime says in this very process, as the bits that the device should send.
-fn bits_expected(blob: &RayBlob<'_>, asked: &Match) -> Result<[u32; 4], u8> {
+/// What the runtime says in this very process.
+fn expected(blob: &RayBlob<'_>, asked: &Match) -> Result<Point, u8> {
     let pixel = |sighting: firmware_sim::protocol::Sighting| {
         (
             usize::from(sighting.camera),
             PixelPoint::new(sighting.u_px, sighting.v_px),
         )
     };
-    match blob.triangulate(pixel(asked.first), pixel(asked.second)) {
-        Ok(found) => {
-            let [x, y, z]: [f32; 3] = found.point_mm.into();
-            Ok([x, y, z, found.gap_squared_mm2].map(f32::to_bits))
-        }
-        Err(error) => Err(error.code()),
-    }
+    blob.triangulate_with_covariance(pixel(asked.first), pixel(asked.second))
+        .map(Point::from)
+        .map_err(MeasureError::code)
 }
 
 #[test]
@@ -74,11 +70,17 @@ fn it_measures_the_bits_of_the_runtime() {
     let mut codes = std::collections::BTreeMap::new();
     for (asked, measured) in asked.iter().zip(&measured) {
         assert_eq!(measured.id, asked.id);
-        let bits = measured.outcome.map(|point| {
-            let [x, y, z] = point.point_mm;
-            [x, y, z, point.gap_squared_mm2].map(f32::to_bits)
-        });
-        assert_eq!(bits, bits_expected(&opened, asked), "match {}", asked.id);
+        let bits = |outcome: Result<Point, u8>| outcome.map(|point| point.to_bits());
+        assert_eq!(
+            bits(measured.outcome),
+            bits(expected(&opened, asked)),
+            "match {}",
+            asked.id
+        );
+        // Two sightings of one camera never give a point, and of the two cameras it is known.
+        if let Ok(point) = measured.outcome {
+            assert!(point.sigma_mm.is_some_and(|s| s.iter().all(|s| *s > 0.0)));
+        }
         *codes
             .entry(measured.outcome.err().unwrap_or(0))
             .or_insert(0) += 1;

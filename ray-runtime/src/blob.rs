@@ -2,16 +2,17 @@
 
 use crate::camera::Camera;
 use crate::check::{
-    check_padding, check_self_tests, checked_header, is_moderate, is_region_on_sensor, is_rotation,
-    recognized_header, same_bits,
+    check_padding, check_pairs, check_self_tests, checked_header, is_moderate, is_region_on_sensor,
+    is_rotation, recognized_header, same_bits,
 };
 use crate::error::Table;
 use crate::format::{
     self, ALIGNMENT, Axis, CameraMeta, Encoding, HEADER_LEN, IDENTITY_LEN, MAX_CELLS, Meta,
-    RECORD_LEN, RECORD_WORDS, Record,
+    PairHeader, RECORD_LEN, RECORD_WORDS, Record,
 };
 use crate::self_test::SelfTests;
 use crate::triangulate::{self, Triangulation};
+use crate::uncertainty::{Measurement, Pair};
 use crate::{LookupError, MeasureError, OpenError, PixelPoint, Ray, lookup};
 
 /// A rig's ray fields, borrowed from the bytes they lie in.
@@ -30,6 +31,7 @@ pub struct RayBlob<'a> {
     camera_meta: &'a [u8],
     self_test_bytes: &'a [u8],
     self_test_count: u16,
+    pair_bytes: &'a [u8],
     max_error_px: f32,
     working_distance_mm: f32,
 }
@@ -76,6 +78,7 @@ impl<'a> RayBlob<'a> {
             camera_meta,
             self_test_bytes: &[],
             self_test_count: meta.self_test_count,
+            pair_bytes: &[],
             max_error_px: meta.max_error_px,
             working_distance_mm: meta.working_distance_mm,
         };
@@ -83,12 +86,21 @@ impl<'a> RayBlob<'a> {
         if !(is_positive(meta.max_error_px) && is_positive(meta.working_distance_mm)) {
             return Err(OpenError::BadMeta);
         }
-        let self_test_bytes = blob.check_cameras(tables_start)?;
-        check_self_tests(self_test_bytes, meta.self_test_count, header.camera_count)?;
-        Ok(Self {
+        let (self_test_bytes, pairs_start) = blob.check_cameras(tables_start)?;
+        let pair_bytes = bytes.get(pairs_start..).ok_or(OpenError::BadHeader)?;
+        check_pairs(bytes, pairs_start, header.pair_count, header.camera_count)?;
+        let blob = Self {
             self_test_bytes,
+            pair_bytes,
             ..blob
-        })
+        };
+        check_self_tests(
+            self_test_bytes,
+            meta.self_test_count,
+            header.camera_count,
+            |cameras| blob.pair(cameras.map(usize::from)).is_some(),
+        )?;
+        Ok(blob)
     }
 
     /// Length that the header states, bytes, if magic and version are right: how much of a longer
@@ -188,6 +200,45 @@ impl<'a> RayBlob<'a> {
         triangulate::triangulate_pair(&self.sighting(a)?, &self.sighting(b)?)
     }
 
+    /// [`RayBlob::triangulate`] with the covariance of the point, rig frame. The cameras may come in
+    /// either order.
+    ///
+    /// The point's bits are those of `triangulate`. It costs about three and a half of them, as the
+    /// rays are looked up with their derivatives. Whoever does not call it has none of it linked but
+    /// what checks the blob.
+    ///
+    /// # Errors
+    /// Those of `triangulate`.
+    pub fn triangulate_with_covariance(
+        &self,
+        a: (usize, PixelPoint),
+        b: (usize, PixelPoint),
+    ) -> Result<Measurement, MeasureError> {
+        let (ray_a, ray_b) = (self.moving_sighting(a)?, self.moving_sighting(b)?);
+        let meeting = triangulate::meet(&ray_a.ray, &ray_b.ray)?;
+        let [lambda_a, lambda_b] = meeting.lambda;
+        let covariance = self.pair([a.0, b.0]).and_then(|(pair, is_swapped)| {
+            let rays = (&ray_a.ray, &ray_b.ray);
+            let by_a = meeting.by_shifts_of_first(rays.0, rays.1, ray_a.shifts_at(lambda_a));
+            let by_b = meeting.by_shifts_of_second(rays.0, rays.1, ray_b.shifts_at(lambda_b));
+            let (pixel, [u1, v1], [u2, v2]) = if is_swapped {
+                (b.1, by_b, by_a)
+            } else {
+                (a.1, by_a, by_b)
+            };
+            pair.covariance(pixel, &[u1, v1, u2, v2])
+        });
+        Ok(Measurement {
+            found: meeting.found,
+            covariance,
+        })
+    }
+
+    /// The pairs of cameras whose uncertainty the blob carries.
+    pub fn uncertain_pairs(&self) -> impl Iterator<Item = PairHeader> {
+        self.pairs().map(|pair| pair.header)
+    }
+
     /// The point nearest to the rays of any number of cameras, by least squares. Two give the
     /// bits of [`RayBlob::triangulate`].
     ///
@@ -210,6 +261,33 @@ impl<'a> RayBlob<'a> {
             .map_err(|error| MeasureError::of_lookup(error, camera))
     }
 
+    fn moving_sighting(
+        &self,
+        (camera, pixel): (usize, PixelPoint),
+    ) -> Result<lookup::MovingRay, MeasureError> {
+        self.record(camera)
+            .and_then(|record| lookup::lookup_moving(self.bytes, self.words, record, pixel))
+            .map_err(|error| MeasureError::of_lookup(error, camera))
+    }
+
+    /// The uncertainty of two cameras, and whether they stand in the other order there.
+    fn pair(&self, cameras: [usize; 2]) -> Option<(Pair<'a>, bool)> {
+        let [a, b] = cameras;
+        self.pairs().find_map(|pair| {
+            let known = pair.header.cameras.map(usize::from);
+            (known == [a, b] || known == [b, a]).then_some((pair, known != [a, b]))
+        })
+    }
+
+    fn pairs(&self) -> impl Iterator<Item = Pair<'a>> + use<'a> {
+        let mut rest = self.pair_bytes;
+        core::iter::from_fn(move || {
+            let (pair, after) = Pair::read(rest)?;
+            rest = after;
+            Some(pair)
+        })
+    }
+
     fn record(&self, camera: usize) -> Result<Record<'a>, LookupError> {
         self.records
             .get(camera)
@@ -229,8 +307,9 @@ impl<'a> RayBlob<'a> {
         })
     }
 
-    /// Checks every camera and its tables; what is left of the metadata behind the cameras.
-    fn check_cameras(&self, tables_start: usize) -> Result<&'a [u8], OpenError> {
+    /// Checks every camera and its tables; what is left of the metadata behind the cameras, and
+    /// where the tables end.
+    fn check_cameras(&self, tables_start: usize) -> Result<(&'a [u8], usize), OpenError> {
         let mut rest = self.camera_meta;
         let mut end = tables_start;
         for (camera, words) in self.records.iter().enumerate() {
@@ -243,11 +322,7 @@ impl<'a> RayBlob<'a> {
             }
             end = self.check_camera(camera as u16, &meta, Record(words), end)?;
         }
-        if end == self.bytes.len() {
-            Ok(rest)
-        } else {
-            Err(OpenError::BadHeader)
-        }
+        Ok((rest, end))
     }
 
     /// Checks a camera's record and tables, which must start at `start`; where they end.

@@ -3,8 +3,9 @@
 use crate::OpenError;
 use crate::format::{
     self, ALIGNMENT, Axis, CameraMeta, HEADER_LEN, Header, MAGIC, MAX_CAMERAS, MAX_EXTENT_PX,
-    MAX_MAGNITUDE, SelfTest, VERSION,
+    MAX_MAGNITUDE, OLDEST_VERSION, SelfTest, VERSION,
 };
+use crate::uncertainty::Pair;
 
 /// The header, if magic and version are right.
 pub(crate) fn recognized_header(bytes: &[u8]) -> Result<Header, OpenError> {
@@ -17,7 +18,7 @@ pub(crate) fn recognized_header(bytes: &[u8]) -> Result<Header, OpenError> {
             found: u32::from_le_bytes(magic),
         });
     }
-    if header.version != VERSION {
+    if !(OLDEST_VERSION..=VERSION).contains(&header.version) {
         return Err(OpenError::WrongVersion {
             found: header.version,
             supported: VERSION,
@@ -46,9 +47,8 @@ pub(crate) fn checked_header(bytes: &[u8]) -> Result<Header, OpenError> {
             computed,
         });
     }
-    let reserved = bytes.get(HEADER_LEN - 2..HEADER_LEN);
     if usize::from(header.header_len) != HEADER_LEN
-        || reserved != Some(&[0, 0])
+        || (header.version == OLDEST_VERSION && header.pair_count != 0)
         || !bytes.len().is_multiple_of(ALIGNMENT)
         || !(1..=MAX_CAMERAS).contains(&header.camera_count)
     {
@@ -66,11 +66,43 @@ pub(crate) fn check_padding(bytes: &[u8], start: usize, end: usize) -> Result<()
         .ok_or(OpenError::BadPadding { at: start as u32 })
 }
 
-/// Checks that there are as many self-tests as stated, of cameras that exist, and nothing else.
+/// Checks that there are as many pairs as stated from `start` to the end of the blob, in order.
+pub(crate) fn check_pairs(
+    bytes: &[u8],
+    start: usize,
+    count: u16,
+    camera_count: u16,
+) -> Result<(), OpenError> {
+    let mut rest = bytes.get(start..).ok_or(OpenError::BadHeader)?;
+    let mut last = None;
+    for index in 0..count {
+        let bad = OpenError::BadPair { pair: index };
+        let (pair, after) = Pair::read(rest).ok_or(bad)?;
+        // In ascending order no pair stands there twice.
+        let cameras = pair.header.cameras;
+        if !pair.is_valid(camera_count) || last.is_some_and(|last| last >= cameras) {
+            return Err(bad);
+        }
+        last = Some(cameras);
+        let from = bytes.len().saturating_sub(rest.len());
+        let to = bytes.len().saturating_sub(after.len());
+        check_padding(bytes, from.saturating_add(pair.header.section_len()), to)?;
+        rest = after;
+    }
+    if rest.is_empty() {
+        Ok(())
+    } else {
+        Err(OpenError::BadHeader)
+    }
+}
+
+/// Checks that there are as many self-tests as stated, of cameras that exist and of pairs whose
+/// uncertainty is known where they ask for it, and nothing else.
 pub(crate) fn check_self_tests(
     bytes: &[u8],
     count: u16,
     camera_count: u16,
+    is_known_pair: impl Fn([u16; 2]) -> bool,
 ) -> Result<(), OpenError> {
     let mut rest = bytes;
     for _ in 0..count {
@@ -80,6 +112,7 @@ pub(crate) fn check_self_tests(
         let has_cameras = match test {
             SelfTest::Ray { camera, .. } => camera < camera_count,
             SelfTest::Pair { cameras, .. } => cameras.iter().all(|c| *c < camera_count),
+            SelfTest::Sigma { cameras, .. } => is_known_pair(cameras),
         };
         if !has_cameras {
             return Err(OpenError::BadMeta);

@@ -88,6 +88,12 @@ pub enum OpenError {
         /// In which table.
         table: Table,
     },
+    /// The uncertainty of a pair of cameras is cut short, out of order, or has a number out of
+    /// its range.
+    BadPair {
+        /// Which, in the blob's order.
+        pair: u16,
+    },
 }
 
 impl OpenError {
@@ -106,6 +112,7 @@ impl OpenError {
             Self::UnknownEncoding { .. } => 10,
             Self::BadLayout { .. } => 11,
             Self::BadNumber { .. } => 12,
+            Self::BadPair { .. } => 13,
         }
     }
 }
@@ -232,8 +239,9 @@ mod tests {
                 camera: 0,
                 table: Table::Mask,
             },
+            OpenError::BadPair { pair: 0 },
         ];
-        assert!(open.iter().map(|e| e.code()).eq(1..=12));
+        assert!(open.iter().map(|e| e.code()).eq(1..=13));
         assert_eq!(LookupError::Outside.code(), 64);
         assert_eq!(
             LookupError::NoSuchCamera {

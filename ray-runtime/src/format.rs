@@ -2,17 +2,23 @@
 //! `FORMAT.md` says the same byte by byte.
 //!
 //! ```text
-//! header | metadata (postcard) | pad to 8 | records | tables
+//! header | metadata (postcard) | pad to 8 | records | tables | pairs
 //! ```
+
+mod pair;
+
+pub use pair::{MAX_NODES, MAX_STEP_PX, NODE_LEN, PAIR_HEADER_LEN, PairHeader, TRIANGLE};
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use serde::{Deserialize, Serialize};
 
 /// The first four bytes of a blob.
 pub const MAGIC: [u8; 4] = *b"RAYS";
-/// The format version that this library reads and the packer writes.
-pub const VERSION: u16 = 1;
-/// Length of the header of version 1.
+/// The format version that the packer writes and the newest that this library reads.
+pub const VERSION: u16 = 2;
+/// The oldest version that this library reads: the same, but without any [`PairHeader`].
+pub const OLDEST_VERSION: u16 = 1;
+/// Length of the header of both versions.
 pub const HEADER_LEN: usize = 24;
 /// Every part after the metadata starts on a multiple of this.
 pub const ALIGNMENT: usize = 8;
@@ -64,11 +70,13 @@ pub struct Header {
     pub meta_len: u32,
     /// Number of cameras.
     pub camera_count: u16,
+    /// Number of pairs of cameras whose uncertainty is known; 0 in version 1.
+    pub pair_count: u16,
 }
 
 impl Header {
-    /// The header at the start of `bytes`, and the magic in front of it. Nothing is judged; the
-    /// last two reserved bytes are left out. `None` if there are too few bytes.
+    /// The header at the start of `bytes`, and the magic in front of it. Nothing is judged.
+    /// `None` if there are too few bytes.
     pub fn read(bytes: &[u8]) -> Option<([u8; 4], Self)> {
         let (b, _) = bytes.split_first_chunk::<HEADER_LEN>()?;
         let magic = [b[0], b[1], b[2], b[3]];
@@ -81,6 +89,7 @@ impl Header {
                 crc: u32::from_le_bytes([b[12], b[13], b[14], b[15]]),
                 meta_len: u32::from_le_bytes([b[16], b[17], b[18], b[19]]),
                 camera_count: u16::from_le_bytes([b[20], b[21]]),
+                pair_count: u16::from_le_bytes([b[22], b[23]]),
             },
         ))
     }
@@ -95,6 +104,7 @@ impl Header {
         bytes[12..16].copy_from_slice(&self.crc.to_le_bytes());
         bytes[16..20].copy_from_slice(&self.meta_len.to_le_bytes());
         bytes[20..22].copy_from_slice(&self.camera_count.to_le_bytes());
+        bytes[22..24].copy_from_slice(&self.pair_count.to_le_bytes());
         bytes
     }
 }
@@ -177,6 +187,15 @@ pub enum SelfTest {
         point_mm: [f32; 3],
         /// Square of the gap, mm2.
         gap_squared_mm2: f32,
+    },
+    /// A match and the standard deviations of its point, of a pair whose uncertainty is known.
+    Sigma {
+        /// Indices of the two cameras.
+        cameras: [u16; 2],
+        /// (u, v) in each, px.
+        pixels: [[f32; 2]; 2],
+        /// Along x, y and z of the rig frame, mm.
+        sigma_mm: [f32; 3],
     },
 }
 
@@ -485,6 +504,7 @@ mod tests {
             crc: 0xdeadbeef,
             meta_len: 99,
             camera_count: 2,
+            pair_count: 1,
         };
         assert_eq!(Header::read(&header.to_bytes()), Some((MAGIC, header)));
         assert_eq!(Header::read(&header.to_bytes()[..HEADER_LEN - 1]), None);

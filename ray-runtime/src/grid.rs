@@ -26,25 +26,37 @@ impl Axis {
     }
 
     /// The grid's cell and the weights at a coordinate that the axis contains.
-    ///
-    /// The fraction is taken from the distance to the cell's first edge, in two steps of which the
-    /// first is exact: at pixel 6000, `coordinate * cells_per_px` minus its integer part would be
-    /// off by 0.0003 px.
     pub(crate) fn place(&self, coordinate_px: f32, cells: u32) -> Place {
-        let x = coordinate_px - self.min_px;
-        let cell = ((x * self.cells_per_px) as u32).min(cells.saturating_sub(1));
-        let number = cell as f32;
-        let rest_px = (x - number * self.cell_high_px) - number * self.cell_low_px;
-        let t = rest_px * self.cells_per_px;
+        let (cell, t) = self.cell_and_fraction(coordinate_px, cells);
         let r = 1.0 - t;
         Place {
-            cell: cell as usize,
+            cell,
             weights: [
                 r * r * r * SIXTH,
                 TWO_THIRDS - r * r * (1.0 - 0.5 * r),
                 t * t * t * SIXTH,
             ],
         }
+    }
+
+    /// Derivatives of a place's weights by the coordinate, 1/px.
+    pub(crate) fn slopes(&self, coordinate_px: f32, cells: u32) -> [f32; 3] {
+        let (_, t) = self.cell_and_fraction(coordinate_px, cells);
+        let r = 1.0 - t;
+        [-0.5 * (r * r), r * (2.0 - 1.5 * r), 0.5 * (t * t)].map(|slope| slope * self.cells_per_px)
+    }
+
+    /// The cell of a coordinate and its place in it, 0 to 1.
+    ///
+    /// The fraction is taken from the distance to the cell's first edge, in two steps of which the
+    /// first is exact: at pixel 6000, `coordinate * cells_per_px` minus its integer part would be
+    /// off by 0.0003 px.
+    fn cell_and_fraction(&self, coordinate_px: f32, cells: u32) -> (usize, f32) {
+        let x = coordinate_px - self.min_px;
+        let cell = ((x * self.cells_per_px) as u32).min(cells.saturating_sub(1));
+        let number = cell as f32;
+        let rest_px = (x - number * self.cell_high_px) - number * self.cell_low_px;
+        (cell as usize, rest_px * self.cells_per_px)
     }
 }
 
@@ -53,8 +65,14 @@ const TWO_THIRDS: f32 = 2.0 / 3.0;
 
 /// Weighted mean of four numbers, written as knot 1 plus differences to it: round-off then is
 /// that of the differences, not of the numbers.
-pub(crate) fn blend(weights: [f32; 3], [a, b, c, d]: [f32; 4]) -> f32 {
-    b + (weights[0] * (a - b) + weights[1] * (c - b) + weights[2] * (d - b))
+pub(crate) fn blend(weights: [f32; 3], knots: [f32; 4]) -> f32 {
+    knots[1] + blend_slopes(weights, knots)
+}
+
+/// What knots 0, 2 and 3 make of their differences to knot 1: with the slopes of the weights, the
+/// derivative of the mean.
+pub(crate) fn blend_slopes(weights: [f32; 3], [a, b, c, d]: [f32; 4]) -> f32 {
+    weights[0] * (a - b) + weights[1] * (c - b) + weights[2] * (d - b)
 }
 
 #[cfg(test)]
@@ -83,6 +101,20 @@ mod tests {
         assert!((place.weights[2] - 1.0 / 6.0).abs() < 1e-6);
         assert_eq!(axis.mask_cell(640.5, 5), 4);
         assert_eq!(axis.mask_cell(-0.5, 5), 0);
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_weights() {
+        let axis = Axis::new(0, 640, 7, 5);
+        for u in [3.0f32, 100.3, 411.7, 630.0] {
+            let [low, high] = [u - 4.0, u + 4.0].map(|u| axis.place(u, 7));
+            assert_eq!(low.cell, high.cell);
+            for (k, slope) in axis.slopes(u, 7).into_iter().enumerate() {
+                let difference = (high.weights[k] - low.weights[k]) / 8.0;
+                // Third derivatives are up to 3 / cell^3, an eighth cell to each side.
+                assert!((slope - difference).abs() < 2e-5, "{u} {k}");
+            }
+        }
     }
 
     #[test]

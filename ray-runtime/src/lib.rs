@@ -16,6 +16,7 @@ mod lookup;
 mod ray;
 mod self_test;
 mod triangulate;
+mod uncertainty;
 
 pub use aligned::Aligned;
 pub use blob::RayBlob;
@@ -24,3 +25,4 @@ pub use error::{LookupError, MeasureError, OpenError, Table};
 pub use ray::{PixelPoint, Ray};
 pub use self_test::{SelfTestFailure, SelfTests};
 pub use triangulate::{MIN_PARALLAX_SIN, Triangulation, triangulate_pair};
+pub use uncertainty::{Measurement, PointCovariance};

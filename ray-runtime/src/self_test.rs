@@ -60,6 +60,19 @@ impl SelfTest {
                     same_bits(result.point_mm.into(), point_mm)
                         && result.gap_squared_mm2.to_bits() == gap_squared_mm2.to_bits()
                 }),
+            Self::Sigma {
+                cameras: [camera_a, camera_b],
+                pixels: [[u_a, v_a], [u_b, v_b]],
+                sigma_mm,
+            } => blob
+                .triangulate_with_covariance(
+                    (camera_a.into(), PixelPoint { u: u_a, v: v_a }),
+                    (camera_b.into(), PixelPoint { u: u_b, v: v_b }),
+                )
+                .is_ok_and(|result| {
+                    let covariance = result.covariance;
+                    covariance.is_some_and(|c| same_bits(c.sigma_mm(), sigma_mm))
+                }),
         }
     }
 }

@@ -34,6 +34,59 @@ impl Triangulation {
 /// # Errors
 /// [`MeasureError::Parallel`] (also for rays that are not finite), [`MeasureError::Behind`].
 pub fn triangulate_pair(a: &Ray, b: &Ray) -> Result<Triangulation, MeasureError> {
+    Ok(meet(a, b)?.found)
+}
+
+/// Two rays' common perpendicular.
+pub(crate) struct Meeting {
+    /// Its middle and its length.
+    pub found: Triangulation,
+    /// Where it starts and ends: `origin + lambda * direction` of each ray.
+    pub lambda: [f32; 2],
+    /// The product of the two directions, along it, and the inverse of its square.
+    normal: Vector3<f32>,
+    inverse: f32,
+}
+
+impl Meeting {
+    /// How the middle moves with shifts of the first ray, mm per mm: half of what goes out of the
+    /// rays' plane, and along the other ray what goes within it. With the normal n it is
+    /// `(n (n.shift) / 2 + d2 ((n x d1).shift)) / n.n`.
+    pub fn by_shifts_of_first(
+        &self,
+        a: &Ray,
+        b: &Ray,
+        shifts: [Vector3<f32>; 2],
+    ) -> [Vector3<f32>; 2] {
+        self.by_shifts(&a.direction, &b.direction, shifts)
+    }
+
+    /// The same with shifts of the second ray; exchanging the rays turns the normal round.
+    pub fn by_shifts_of_second(
+        &self,
+        a: &Ray,
+        b: &Ray,
+        shifts: [Vector3<f32>; 2],
+    ) -> [Vector3<f32>; 2] {
+        self.by_shifts(&b.direction, &-a.direction, shifts)
+    }
+
+    fn by_shifts(
+        &self,
+        own: &Vector3<f32>,
+        other: &Vector3<f32>,
+        shifts: [Vector3<f32>; 2],
+    ) -> [Vector3<f32>; 2] {
+        let across = self.normal.cross(own);
+        shifts.map(|shift| {
+            let out_of_plane = self.normal * (0.5 * self.normal.dot(&shift));
+            (out_of_plane + other * across.dot(&shift)) * self.inverse
+        })
+    }
+}
+
+/// Where two rays meet.
+pub(crate) fn meet(a: &Ray, b: &Ray) -> Result<Meeting, MeasureError> {
     let (d1, d2) = (a.direction, b.direction);
     let w = b.origin_mm - a.origin_mm;
     let normal = d1.cross(&d2);
@@ -48,9 +101,14 @@ pub fn triangulate_pair(a: &Ray, b: &Ray) -> Result<Triangulation, MeasureError>
         return Err(MeasureError::Behind);
     }
     let along = w.dot(&normal);
-    Ok(Triangulation {
-        point_mm: ((a.origin_mm + d1 * lambda1) + (b.origin_mm + d2 * lambda2)) * 0.5,
-        gap_squared_mm2: along * along * inverse,
+    Ok(Meeting {
+        found: Triangulation {
+            point_mm: ((a.origin_mm + d1 * lambda1) + (b.origin_mm + d2 * lambda2)) * 0.5,
+            gap_squared_mm2: along * along * inverse,
+        },
+        lambda: [lambda1, lambda2],
+        normal,
+        inverse,
     })
 }
 
@@ -224,6 +282,31 @@ mod tests {
         assert_eq!(result.point_mm, Vector3::new(1.0, 0.0, 1.0));
         assert_eq!(result.gap_squared_mm2, 4.0);
         assert_eq!(result.gap_mm(), 2.0);
+    }
+
+    #[test]
+    fn the_middle_moves_as_shifts_of_its_rays_say() {
+        let target = Vector3::new(10.0, -20.0, 300.0);
+        let rays = [[0.0, 0.0, 0.0], [100.0, 15.0, 7.0]]
+            .map(|o| ray(o, (target - Vector3::from(o)).into()));
+        let meeting = meet(&rays[0], &rays[1]).unwrap();
+        for axis in 0..3 {
+            let mut shift = Vector3::zeros();
+            shift[axis] = 1.0;
+            let [by_a, _] = meeting.by_shifts_of_first(&rays[0], &rays[1], [shift; 2]);
+            let [by_b, _] = meeting.by_shifts_of_second(&rays[0], &rays[1], [shift; 2]);
+            for (shifted, by) in [(0, by_a), (1, by_b)] {
+                let mut moved = rays;
+                moved[shifted].origin_mm += shift;
+                let change = triangulate_pair(&moved[0], &moved[1]).unwrap().point_mm
+                    - meeting.found.point_mm;
+                // The point is linear in the shift; 300 mm have steps of 3e-5 mm.
+                assert!(
+                    (by - change).norm() < 3e-4,
+                    "{shifted} {axis}: {by} {change}"
+                );
+            }
+        }
     }
 
     #[test]

@@ -2,16 +2,23 @@
 
 mod common;
 
-use common::{AlignedBytes, Random, TestBlob, TestCamera, records_start, repair_checksum};
-use ray_runtime::format::{Encoding, HEADER_LEN, MAGIC, RECORD_LEN, SelfTest, VERSION};
+use common::{
+    AlignedBytes, Random, TestBlob, TestCamera, TestPair, records_start, repair_checksum,
+};
+use ray_runtime::format::{
+    Encoding, HEADER_LEN, MAGIC, OLDEST_VERSION, PAIR_HEADER_LEN, PairHeader, RECORD_LEN, SelfTest,
+    VERSION,
+};
 use ray_runtime::{OpenError, PixelPoint, RayBlob, Table};
 
-/// One central and one non-central camera, with a mask whose last byte is not full.
+/// One central and one non-central camera, with a mask whose last byte is not full, and their
+/// uncertainty.
 fn sample() -> TestBlob {
     let mut second = TestCamera::new("second", 80.0);
     second.encoding = Encoding::NonCentralF32;
     second.offset_mm = [0.5, -0.25];
     let mut blob = TestBlob::new(vec![TestCamera::new("first", -80.0), second]);
+    blob.pairs = vec![TestPair::new([0, 1])];
     blob.self_tests = vec![SelfTest::Ray {
         camera: 1,
         pixel: [1.0, 2.0],
@@ -110,14 +117,16 @@ fn each_part_of_the_header_is_judged() {
     let found = u32::from_le_bytes(zeros);
     assert_eq!(refused_with(0, &zeros), OpenError::BadMagic { found });
     assert_ne!(zeros, MAGIC);
-    assert_eq!(
-        refused_with(4, &2u16.to_le_bytes()),
-        OpenError::WrongVersion {
-            found: 2,
-            supported: VERSION
-        }
-    );
-    // Header length, metadata length (three ways), camera count, reserved.
+    for found in [0, OLDEST_VERSION - 1, VERSION + 1, u16::MAX] {
+        let supported = VERSION;
+        assert_eq!(
+            refused_with(4, &found.to_le_bytes()),
+            OpenError::WrongVersion { found, supported }
+        );
+    }
+    // Version 1 has no pairs.
+    assert_eq!(refused_with(4, &1u16.to_le_bytes()), OpenError::BadHeader);
+    // Header length, metadata length (three ways), camera count, pair count.
     assert_eq!(refused_with(6, &32u16.to_le_bytes()), OpenError::BadHeader);
     assert_eq!(
         refused_with(16, &u32::MAX.to_le_bytes()),
@@ -125,7 +134,11 @@ fn each_part_of_the_header_is_judged() {
     );
     assert_eq!(refused_with(20, &0u16.to_le_bytes()), OpenError::BadHeader);
     assert_eq!(refused_with(20, &65u16.to_le_bytes()), OpenError::BadHeader);
-    assert_eq!(refused_with(22, &1u16.to_le_bytes()), OpenError::BadHeader);
+    assert_eq!(refused_with(22, &0u16.to_le_bytes()), OpenError::BadHeader);
+    assert_eq!(
+        refused_with(22, &2u16.to_le_bytes()),
+        OpenError::BadPair { pair: 1 }
+    );
     let no_cameras = TestBlob::new(Vec::new()).bytes();
     assert_eq!(refused(no_cameras.bytes()), OpenError::BadHeader);
 }
@@ -137,7 +150,7 @@ fn each_part_of_the_metadata_is_judged() {
         spoil(&mut content);
         refused(content.bytes().bytes())
     };
-    let spoils: [fn(&mut TestBlob); 14] = [
+    let spoils: [fn(&mut TestBlob); 15] = [
         |b| b.max_error_px = f32::NAN,
         |b| b.max_error_px = -1.0,
         |b| b.max_error_px = f32::INFINITY,
@@ -166,6 +179,14 @@ fn each_part_of_the_metadata_is_judged() {
                 gap_squared_mm2: 0.0,
             }
         },
+        |b| {
+            b.pairs.clear();
+            b.self_tests[0] = SelfTest::Sigma {
+                cameras: [0, 1],
+                pixels: [[0.0; 2]; 2],
+                sigma_mm: [0.0; 3],
+            }
+        },
     ];
     for (k, spoil) in spoils.into_iter().enumerate() {
         assert_eq!(spoiled(spoil), OpenError::BadMeta, "number {k}");
@@ -189,7 +210,13 @@ fn padding_that_is_not_zero_is_refused() {
         refused_with(start - 1, &[1]),
         OpenError::BadPadding { .. }
     ));
+    // Behind 32 bytes and 6 nodes of 11 there are 6 zeros.
     let end = bytes.bytes().len();
+    assert_eq!(
+        refused_with(end - 1, &[1]),
+        OpenError::BadPadding { at: end as u32 - 6 }
+    );
+    let end = end - 104;
     assert_eq!(
         refused_with(end - 1, &[1]),
         OpenError::BadPadding { at: end as u32 - 6 }
@@ -275,6 +302,68 @@ fn every_number_of_a_grid_must_be_finite() {
     }
 }
 
+#[test]
+fn each_part_of_a_pair_is_judged() {
+    let spoiled = |spoil: fn(&mut PairHeader)| {
+        let mut content = sample();
+        spoil(&mut content.pairs[0].header);
+        refused(content.bytes().bytes())
+    };
+    let spoils: [fn(&mut PairHeader); 14] = [
+        |h| h.cameras = [0, 0],
+        |h| h.cameras = [1, 0],
+        |h| h.cameras = [0, 2],
+        |h| h.nodes[0] = 1,
+        |h| h.nodes[1] = 0,
+        |h| h.nodes[1] = 65,
+        |h| h.first_px[0] = f32::NAN,
+        |h| h.first_px[1] = 2e6,
+        |h| h.nodes_per_px[0] = 0.0,
+        |h| h.nodes_per_px[1] = f32::INFINITY,
+        |h| h.step_px = -1e-9,
+        |h| h.step_px = 1.01,
+        |h| h.noise_px2 = f32::NAN,
+        |h| h.noise_px2 = -1.0,
+    ];
+    for (k, spoil) in spoils.into_iter().enumerate() {
+        assert_eq!(spoiled(spoil), OpenError::BadPair { pair: 0 }, "number {k}");
+    }
+    // More nodes than there are bytes for; fewer leave bytes that must be zero, or too many.
+    let bytes = sample().bytes();
+    let start = bytes.bytes().len() - 104;
+    assert_eq!(
+        refused_with(start + 4, &[4, 0]),
+        OpenError::BadPair { pair: 0 }
+    );
+    assert!(matches!(
+        refused_with(start + 4, &[2, 0]),
+        OpenError::BadPadding { .. } | OpenError::BadHeader
+    ));
+    // Any node is a factor of some covariance.
+    let mut any = sample();
+    any.pairs[0].node = [0xff; 11];
+    assert!(RayBlob::open(any.bytes().bytes()).is_ok());
+    assert_eq!(PAIR_HEADER_LEN + 6 * 11 + 6, 104);
+}
+
+#[test]
+fn pairs_that_stand_there_twice_or_out_of_order_are_refused() {
+    let mut content = sample();
+    content.cameras.push(TestCamera::new("third", 200.0));
+    let refused_at_1 = |pairs: &[[u16; 2]]| {
+        content.pairs = pairs
+            .iter()
+            .map(|cameras| TestPair::new(*cameras))
+            .collect();
+        RayBlob::open(content.bytes().bytes()).err()
+    };
+    let mut check = refused_at_1;
+    let bad = Some(OpenError::BadPair { pair: 1 });
+    assert_eq!(check(&[[0, 1], [0, 1]]), bad);
+    assert_eq!(check(&[[1, 2], [0, 1]]), bad);
+    assert_eq!(check(&[[0, 1], [0, 2], [1, 2]]), None);
+}
+
 /// Whatever opens must answer; nothing may panic. The checksum is repaired, so the damage gets
 /// past it.
 #[test]
@@ -316,6 +405,7 @@ fn random_damage_with_a_right_checksum_never_panics() {
             }
         }
         let pixel = PixelPoint::new(30.0, 20.0);
+        let _ = blob.triangulate_with_covariance((1, pixel), (0, pixel));
         let _ = blob.triangulate_many(&[(0, pixel), (1, pixel), (0, PixelPoint::new(1.0, 1.0))]);
         let _ = blob.run_self_tests();
     }

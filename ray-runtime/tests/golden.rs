@@ -1,4 +1,4 @@
-//! Exact bytes: the golden blob of version 1 is read as on the day it was written.
+//! Exact bytes: the golden blobs of versions 1 and 2 are read as on the day they were written.
 
 use ray_runtime::format::{self, Encoding, HEADER_LEN, Header, MAGIC, RECORD_LEN, Record};
 use ray_runtime::{Aligned, LookupError, MeasureError, PixelPoint, RayBlob, Region};
@@ -105,4 +105,59 @@ fn what_is_not_calibrated_has_no_answer() {
         blob.triangulate((1, inside), (0, corner)),
         Err(MeasureError::Outside { camera: 0 })
     );
+}
+
+static GOLDEN_2: &Aligned<[u8]> = &Aligned(*include_bytes!("../../data/golden/stereo-v2.rays"));
+
+#[test]
+fn version_2_has_a_pair_behind_the_tables() {
+    let bytes = &GOLDEN_2.0;
+    assert_eq!(bytes[..8], [b'R', b'A', b'Y', b'S', 2, 0, 24, 0]);
+    let (_, header) = Header::read(bytes).unwrap();
+    assert_eq!(header.total_len as usize, bytes.len());
+    assert_eq!((header.meta_len, header.camera_count), (425, 2));
+    assert_eq!(header.pair_count, 1);
+    // Computed by zlib over all bytes but these four.
+    assert_eq!(header.crc, 0x5efd_b562);
+    // 32 bytes and 8 x 6 nodes of 11: the end of the blob, without padding.
+    let pair = 2832;
+    assert_eq!(bytes.len(), pair + 32 + 8 * 6 * 11);
+    assert_eq!(bytes[pair..pair + 8], [0, 0, 1, 0, 8, 0, 6, 0]);
+    // The calibrated area begins at (3.5, 2.17) px; nodes every 8.2 and 8.5 px; 0.05 px of noise.
+    let numbers: [f32; 6] = std::array::from_fn(|k| {
+        let at = pair + 8 + 4 * k;
+        f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap())
+    });
+    assert_eq!(numbers[0], 3.5);
+    assert_eq!(numbers[3], 0.1171875);
+    assert_eq!(numbers[5], 0.0025);
+    let opened = RayBlob::open(bytes).unwrap();
+    let header = opened.uncertain_pairs().next().unwrap();
+    assert_eq!((header.cameras, header.nodes), ([0, 1], [8, 6]));
+    assert_eq!(header.nodes_per_px, [numbers[2], numbers[3]]);
+    assert_eq!(header.step_px, numbers[4]);
+}
+
+#[test]
+fn standard_deviations_keep_their_bits() {
+    let blob = RayBlob::open(&GOLDEN_2.0).unwrap();
+    assert_eq!(blob.run_self_tests(), Ok(10));
+    let (a, b) = (PixelPoint::new(30.0, 20.5), PixelPoint::new(33.0, 21.0));
+    let measured = blob.triangulate_with_covariance((0, a), (1, b)).unwrap();
+    let sigma_mm = measured.covariance.unwrap().sigma_mm();
+    assert_eq!(sigma_mm.map(f32::to_bits), SIGMA);
+}
+
+// From a separate evaluation of FORMAT.md's formulas in Python with f32 arithmetic:
+// 0.6851, 0.5877 and 1.4421 mm.
+const SIGMA: [u32; 3] = [0x3f2f_612f, 0x3f16_76a4, 0x3fb8_9568];
+
+#[test]
+fn version_1_has_no_uncertainty() {
+    let blob = RayBlob::open(&GOLDEN.0).unwrap();
+    assert_eq!(blob.uncertain_pairs().count(), 0);
+    let (a, b) = (PixelPoint::new(30.0, 20.5), PixelPoint::new(33.0, 21.0));
+    let measured = blob.triangulate_with_covariance((0, a), (1, b)).unwrap();
+    assert_eq!(Ok(measured.found), blob.triangulate((0, a), (1, b)));
+    assert_eq!(measured.covariance, None);
 }

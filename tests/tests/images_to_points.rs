@@ -107,6 +107,8 @@ fn the_cortex_m_gives_the_bits_of_the_host(scene: &Scene, calibration: &Calibrat
     let device = QemuDevice::start(loopback(), &image, Some(&file)).unwrap();
     let blob = aligned(&packed);
     let blob = RayBlob::open(&blob).unwrap();
+    // So what is compared are standard deviations as well.
+    assert_eq!(blob.uncertain_pairs().count(), 1);
     let checked = check(device.address(), &blob, &pairs(scene, 500)).unwrap();
     assert_eq!(checked.device, "firmware-sim cortex-m");
     assert_eq!((checked.matches, checked.different), (500, 0));

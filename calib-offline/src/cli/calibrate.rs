@@ -212,6 +212,7 @@ pub fn pack_settings(calibration: &Calibration, max_error_px: f64) -> PackSettin
         max_error_px,
         working_distance_mm,
         identity: calibration.identity(),
+        ..PackSettings::default()
     }
 }
 

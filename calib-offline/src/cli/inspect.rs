@@ -11,6 +11,7 @@ use crate::report::facts::Facts;
 use crate::report::text::{short, summary};
 use clap::Args;
 use ray_runtime::RayBlob;
+use ray_runtime::format::aligned;
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -30,7 +31,8 @@ With --json: schema calib-offline/inspect/1 and kind, which is
                warnings; null before detect)
   calibration  tool_version, method, input_sha256, and the facts that calibrate prints
   blob         bytes, identity, frame, written_by, max_error_px, working_distance_mm, self_tests,
-               cameras (name, sensor_px, region_px, cells, central, position_mm)";
+               cameras (name, sensor_px, region_px, cells, central, position_mm),
+               pairs whose uncertainty it carries (cameras, nodes, bytes, noise_px)";
 
 /// The arguments.
 #[derive(Debug, Args)]
@@ -96,6 +98,7 @@ struct BlobObject {
     working_distance_mm: f32,
     self_tests: usize,
     cameras: Vec<BlobCamera>,
+    pairs: Vec<BlobPair>,
 }
 
 #[derive(Debug, Serialize)]
@@ -107,6 +110,16 @@ struct BlobCamera {
     cells: [u32; 2],
     central: bool,
     position_mm: [f32; 3],
+}
+
+/// The uncertainty of two cameras.
+#[derive(Debug, Serialize)]
+struct BlobPair {
+    cameras: [String; 2],
+    nodes: [u16; 2],
+    bytes: usize,
+    /// Standard deviation of a measured pixel coordinate.
+    noise_px: f32,
 }
 
 /// Runs the command.
@@ -283,6 +296,18 @@ fn blob_object(blob: &RayBlob<'_>) -> BlobObject {
                 position_mm: camera.rig_from_camera.translation_mm.into(),
             })
             .collect(),
+        pairs: blob
+            .uncertain_pairs()
+            .map(|pair| BlobPair {
+                cameras: pair.cameras.map(|camera| {
+                    let camera = blob.camera(camera.into());
+                    camera.map_or_else(String::new, |camera| camera.name.to_owned())
+                }),
+                nodes: pair.nodes,
+                bytes: aligned(pair.section_len()),
+                noise_px: pair.noise_px2.sqrt(),
+            })
+            .collect(),
     }
 }
 
@@ -313,6 +338,18 @@ fn blob_words(object: &BlobObject) -> String {
                 "non-central"
             }
         );
+    }
+    for pair in &object.pairs {
+        let ([first, second], [nodes_u, nodes_v]) = (&pair.cameras, pair.nodes);
+        let _ = writeln!(
+            words,
+            "uncertainty     of {first} with {second}, {nodes_u} x {nodes_v} nodes, {} bytes; pixel noise {} px",
+            pair.bytes,
+            short(f64::from(pair.noise_px))
+        );
+    }
+    if object.pairs.is_empty() {
+        words.push_str("uncertainty     none: points measured with it have no sigma\n");
     }
     words
 }

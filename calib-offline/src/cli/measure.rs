@@ -25,7 +25,9 @@ MATCHES.csv has the header id,u_left,v_left,u_right,v_right, with the names of t
 Leave both fields of a camera empty where it did not see the point; two must be left.
 POINTS.csv has the header id,x,y,z,gap,sigma_x,sigma_y,sigma_z,status and one row per match, in
 the order of the matches; lengths in mm. The status is ok, outside (of the calibrated area),
-parallel or behind; only ok has numbers.
+parallel or behind; only ok has numbers. sigma is the predicted standard deviation of the point, for
+matches of two cameras whose uncertainty the rig carries: what the calibration leaves open (a rigid
+motion of the whole rig taken out) and pixel noise of the size of its corners'. Else it is empty.
 
 A blob is evaluated with the device's own library and gives the device's bits; a calibration is
 evaluated in double precision. An earlier POINTS.csv is replaced; any other file only with --force.

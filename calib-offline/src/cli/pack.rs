@@ -6,7 +6,7 @@ use super::output::Console;
 use super::place::check_file;
 use crate::atomic_file;
 use crate::error::Error;
-use crate::pack::pack;
+use crate::pack::{Deviation, PackSettings, pack};
 use crate::report::Calibration;
 use crate::report::text::short;
 use clap::Args;
@@ -20,11 +20,13 @@ Example:
 
 const FORMATS: &str = "\
 Every pixel of the calibrated area is looked up in the finished blob and compared with the
-calibration: none is further off than the bound. An earlier blob is replaced; any other file only
-with --force.
+calibration: none is further off than the bound. The uncertainty goes with it on a coarse grid; how
+far that changes predicted standard deviations is measured and said. An earlier blob is replaced;
+any other file only with --force.
 
 With --json: schema calib-offline/pack/1, output, bytes, max_error_px (asked for), worst_error_px
-(found), cameras (name, cells, bytes, worst_error_px), curve (pairs of table bytes and error, px).";
+(found), cameras (name, cells, bytes, worst_error_px), pairs (cameras, nodes, bytes; sigma_error and
+calibration_sigma_error: rms and worst, relative), curve (pairs of table bytes and error, px).";
 
 /// The arguments.
 #[derive(Debug, Args)]
@@ -39,6 +41,9 @@ pub struct PackArgs {
     /// No ray may be further off than this, px
     #[arg(long, value_name = "E", default_value_t = BLOB_MAX_ERROR_PX)]
     pub max_error_px: f64,
+    /// Leave out the uncertainty: a smaller blob, and no sigma from it
+    #[arg(long)]
+    pub no_uncertainty: bool,
     /// Replace whatever stands in the output's place
     #[arg(long)]
     pub force: bool,
@@ -53,6 +58,7 @@ struct PackObject<'a> {
     max_error_px: f64,
     worst_error_px: f64,
     cameras: Vec<PackedCamera>,
+    pairs: Vec<PairObject>,
     curve: Vec<(usize, f64)>,
 }
 
@@ -64,6 +70,15 @@ struct PackedCamera {
     worst_error_px: f64,
 }
 
+#[derive(Debug, Serialize)]
+struct PairObject {
+    cameras: [String; 2],
+    nodes: [u16; 2],
+    bytes: usize,
+    sigma_error: Deviation,
+    calibration_sigma_error: Deviation,
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -72,10 +87,11 @@ pub fn run(args: &PackArgs, console: &Console) -> Result<Outcome, Error> {
     check_file(&args.output, &MAGIC, &[&args.calibration], args.force)?;
     let calibration = Calibration::load(&args.calibration)?;
     console.progress().begin("packing the blob", 0);
-    let packed = pack(
-        &calibration.rig,
-        &pack_settings(&calibration, args.max_error_px),
-    );
+    let settings = PackSettings {
+        with_uncertainty: !args.no_uncertainty,
+        ..pack_settings(&calibration, args.max_error_px)
+    };
+    let packed = pack(&calibration.rig, &settings);
     console.progress().end();
     let packed = packed?;
     atomic_file::write(&args.output, &packed.bytes)?;
@@ -95,10 +111,22 @@ pub fn run(args: &PackArgs, console: &Console) -> Result<Outcome, Error> {
                 worst_error_px: grid.proof.worst_error_px,
             })
             .collect(),
+        pairs: packed
+            .pairs
+            .into_iter()
+            .map(|pair| PairObject {
+                cameras: pair.cameras,
+                nodes: pair.nodes,
+                bytes: pair.bytes,
+                sigma_error: pair.sigma_error,
+                calibration_sigma_error: pair.calibration_sigma_error,
+            })
+            .collect(),
         curve: packed.curve,
     };
+    let uncertainty: String = object.pairs.iter().map(pair_words).collect();
     let words = format!(
-        "{} bytes, every ray within {} px (asked for: {} px); written to {}",
+        "{} bytes, every ray within {} px (asked for: {} px){uncertainty}; written to {}",
         object.bytes,
         short(object.worst_error_px),
         args.max_error_px,
@@ -106,4 +134,15 @@ pub fn run(args: &PackArgs, console: &Console) -> Result<Outcome, Error> {
     );
     console.result(&words, &object);
     Ok(Outcome::Done)
+}
+
+fn pair_words(pair: &PairObject) -> String {
+    let percent = |share: f64| short(100.0 * share);
+    let [first, second] = &pair.cameras;
+    format!(
+        "; {} of the bytes are the uncertainty of {first} and {second}, its sigma off by {} % RMS and {} % at worst",
+        pair.bytes,
+        percent(pair.sigma_error.rms),
+        percent(pair.sigma_error.worst)
+    )
 }

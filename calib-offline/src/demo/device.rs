@@ -8,7 +8,7 @@ use firmware_sim::client::{ClientError, DeviceClient};
 use firmware_sim::host::SimulatedDevice;
 use firmware_sim::protocol::{Match, Point};
 use firmware_sim::qemu::{QemuDevice, QemuError, image_path, require_qemu};
-use ray_runtime::{PixelPoint, RayBlob};
+use ray_runtime::{MeasureError, PixelPoint, RayBlob};
 use serde::Serialize;
 use std::collections::HashMap;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -101,20 +101,13 @@ fn on_wire((camera_idx, [u_px, v_px]): Sighting<f32>) -> firmware_sim::protocol:
 
 fn on_host(blob: &RayBlob<'_>, pair: &Pair) -> Result<Point, u8> {
     let [first, second] = pair.map(|(camera_idx, [u, v])| (camera_idx, PixelPoint::new(u, v)));
-    match blob.triangulate(first, second) {
-        Ok(found) => Ok(Point {
-            point_mm: found.point_mm.into(),
-            gap_squared_mm2: found.gap_squared_mm2,
-        }),
-        Err(error) => Err(error.code()),
-    }
+    blob.triangulate_with_covariance(first, second)
+        .map(Point::from)
+        .map_err(MeasureError::code)
 }
 
-fn bits(outcome: &Result<Point, u8>) -> Result<[u32; 4], u8> {
-    outcome.map(|point| {
-        let [x, y, z] = point.point_mm;
-        [x, y, z, point.gap_squared_mm2].map(f32::to_bits)
-    })
+fn bits(outcome: &Result<Point, u8>) -> Result<[Option<u32>; 7], u8> {
+    outcome.map(|point| point.to_bits())
 }
 
 /// The corners that the first two cameras both saw, as matches.

@@ -70,10 +70,7 @@ mod tests {
     use nalgebra::Vector2;
 
     fn narrow_lens(offset: impl Fn(usize) -> Vector2<f64>) -> Centrality {
-        let base = BaseLens {
-            projection: Projection::Perspective,
-            focal_px: 50_000.0,
-        };
+        let base = BaseLens::ideal(Projection::Perspective, 50_000.0);
         let sensor = SensorSize::new(800, 800);
         let mut field = RayField::ideal(sensor, base, 3);
         let mut map = SmoothMap::zero(2);

@@ -163,7 +163,6 @@ impl LensFit<'_> {
 mod tests {
     use super::*;
     use crate::field::Projection;
-    use crate::geometry::SensorSize;
 
     #[test]
     fn a_wide_lens_off_center_is_found_with_its_turn() {

@@ -15,5 +15,5 @@ pub mod uncertainty;
 pub use base_lens::{BaseLens, Projection};
 pub use coverage::CoverageMask;
 pub use ray_field::{FieldSample, RayField, SmoothMap};
-pub use rig::{CalibratedCamera, MeasureError, Rig};
+pub use rig::{CalibratedCamera, MeasureError, PointCovariance, Rig};
 pub use uncertainty::PairUncertainty;

@@ -6,7 +6,7 @@ use crate::geometry::{
     PixelPoint, Ray, RigidTransform, Triangulation, midpoint_by_shifts, triangulate_pair,
     triangulate_rays,
 };
-use nalgebra::{Matrix3, Matrix3x4, Matrix4};
+use nalgebra::{Matrix3, Matrix3x2, Matrix3x4, Matrix4, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// One calibrated camera.
@@ -56,6 +56,40 @@ impl CalibratedCamera {
             .contains(pixel)
             .then(|| self.field.ray(pixel).transformed(&self.rig_from_camera))
     }
+
+    /// The point at a distance along the pixel's ray, rig frame, mm, and the pixel at which another
+    /// camera sees it; `None` if either pixel is not calibrated.
+    pub fn seen_by(
+        &self,
+        other: &Self,
+        pixel: PixelPoint,
+        distance_mm: f64,
+    ) -> Option<(Vector3<f64>, PixelPoint)> {
+        let ray = self.ray_in_rig(pixel)?;
+        let point_in_rig = ray.origin_mm + ray.direction.normalize() * distance_mm;
+        let point_in_other = other.rig_from_camera.inverse().point(&point_in_rig);
+        let seen = other.field.project(&point_in_other)?;
+        other
+            .coverage
+            .contains(seen)
+            .then_some((point_in_rig, seen))
+    }
+
+    /// How the pixel's ray moves across itself at a point on it, per px of u and of v (columns):
+    /// rig frame, mm/px. The point is given in the rig frame, mm.
+    pub fn ray_shift_mm_per_px(
+        &self,
+        pixel: PixelPoint,
+        point_in_rig: &Vector3<f64>,
+    ) -> Matrix3x2<f64> {
+        let sample = self.field.sample(pixel);
+        let point_in_camera = self.rig_from_camera.inverse().point(point_in_rig);
+        let local = transport::frame(&sample.s).tr_mul(&point_in_camera);
+        // What moves is the point against the ray; the ray moves the other way.
+        let by_s = transport::local_point_derivative(&sample.s, &local);
+        let shift_along_axes = sample.dm - by_s.fixed_rows::<2>(0) * sample.ds;
+        self.rig_from_camera.rotation * transport::across(&sample.s) * shift_along_axes
+    }
 }
 
 /// Covariance of a triangulated point.
@@ -77,6 +111,9 @@ impl PointCovariance {
 impl Rig {
     /// Covariance of the point of two sightings, in either order; `None` if the pair has no
     /// uncertainty, for a pixel without a ray, and for parallel rays.
+    ///
+    /// `J (C + noise I) J^T` with the derivative J of the midpoint by the four pixel coordinates
+    /// and the pair's covariance C of pixels (METHOD 5).
     pub fn pair_covariance(&self, sightings: [(usize, PixelPoint); 2]) -> Option<PointCovariance> {
         let pair = |first: usize, second: usize| {
             self.uncertainty
@@ -90,27 +127,23 @@ impl Rig {
         };
         let see = |(idx, pixel): (usize, PixelPoint)| {
             let camera = self.cameras.get(idx)?;
-            let ray = camera.ray_in_rig(pixel)?;
-            let axes =
-                camera.rig_from_camera.rotation * transport::across(&camera.field.sample(pixel).s);
-            Some((ray, axes))
+            Some((camera, camera.ray_in_rig(pixel)?))
         };
-        let ((ray_a, axes_a), (ray_b, axes_b)) = (see(a)?, see(b)?);
+        let ((camera_a, ray_a), (camera_b, ray_b)) = (see(a)?, see(b)?);
         let point = triangulate_pair(&ray_a, &ray_b).ok()?.point_mm;
         let (by_a, by_b) = midpoint_by_shifts(&ray_a, &ray_b)?;
-        // Columns: what a unit of each ray's direction along its axes does to the point.
-        let mut by_direction = Matrix3x4::zeros();
-        by_direction
+        // Columns: what a pixel of each coordinate does to the point.
+        let mut by_pixels = Matrix3x4::zeros();
+        by_pixels
             .fixed_columns_mut::<2>(0)
-            .copy_from(&(by_a * axes_a * (point - ray_a.origin_mm).norm()));
-        by_direction
+            .copy_from(&(by_a * camera_a.ray_shift_mm_per_px(a.1, &point)));
+        by_pixels
             .fixed_columns_mut::<2>(2)
-            .copy_from(&(by_b * axes_b * (point - ray_b.origin_mm).norm()));
-        let (calibration, noise) = uncertainty.at(a.1);
-        let carry = |c: Matrix4<f64>| by_direction * c * by_direction.transpose();
+            .copy_from(&(by_b * camera_b.ray_shift_mm_per_px(b.1, &point)));
+        let carry = |px2: Matrix4<f64>| by_pixels * px2 * by_pixels.transpose();
         Some(PointCovariance {
-            calibration_mm2: carry(calibration),
-            noise_mm2: carry(noise),
+            calibration_mm2: carry(uncertainty.calibration_at(a.1)),
+            noise_mm2: carry(Matrix4::identity() * uncertainty.noise_px2),
         })
     }
 

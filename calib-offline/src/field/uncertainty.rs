@@ -4,12 +4,13 @@ use crate::geometry::{PixelPoint, SensorSize};
 use nalgebra::Matrix4;
 use serde::{Deserialize, Serialize};
 
-/// Joint covariance of the directions of two rays that meet at the working distance.
+/// Joint covariance of where two cameras see one point at the working distance, px^2.
 ///
-/// Each ray's direction is taken along its two axes (`transport::across`), as seen from its
-/// camera's reference point: where a ray passes at distance `lambda` has `lambda^2` times the
-/// covariance of its direction. Components: first ray's x and y, second ray's x and y, rad^2. The
-/// two rays are *not* independent: poses are shared, so errors of both cameras go together, and a
+/// What the calibration leaves uncertain in a ray is said as the shift of its pixel that would make
+/// up for it, so that a point is uncertain as if its pixels were: with the derivative of the point
+/// by its four pixel coordinates ([`Rig::pair_covariance`](super::Rig::pair_covariance)), both parts
+/// become one covariance. Components: first camera's u and v, second camera's u and v. The two
+/// pixels are *not* independent: poses are shared, so errors of both cameras go together, and a
 /// sum of separate covariances would overstate the error of a point about twofold.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PairUncertainty {
@@ -24,10 +25,10 @@ pub struct PairUncertainty {
     /// Nodes along v, likewise.
     pub nodes_v: usize,
     /// What the calibration leaves uncertain, the six rigid motions of the whole rig taken out
-    /// (they change no measured shape). Per node, row-major: upper triangle row by row, rad^2.
-    pub calibration: Vec<[f64; 10]>,
-    /// What pixel noise of the size of the corners' adds; likewise.
-    pub noise: Vec<[f64; 10]>,
+    /// (they change no measured shape). Per node, row-major: upper triangle row by row, px^2.
+    pub calibration_px2: Vec<[f64; 10]>,
+    /// Variance of a measured pixel coordinate, that of the corners' noise, px^2.
+    pub noise_px2: f64,
 }
 
 impl PairUncertainty {
@@ -36,8 +37,8 @@ impl PairUncertainty {
         node_pixel(self.sensor, self.nodes_u, self.nodes_v, i, j)
     }
 
-    /// Calibration and noise part at a pixel of the first camera, bilinear between nodes, rad^2.
-    pub fn at(&self, pixel: PixelPoint) -> (Matrix4<f64>, Matrix4<f64>) {
+    /// The calibration's part at a pixel of the first camera, bilinear between nodes, px^2.
+    pub fn calibration_at(&self, pixel: PixelPoint) -> Matrix4<f64> {
         let place = |x: f64, extent: u32, nodes: usize| {
             let position = (x + 0.5) / f64::from(extent) * (nodes - 1) as f64;
             let first = (position.floor().max(0.0) as usize).min(nodes - 2);
@@ -45,19 +46,16 @@ impl PairUncertainty {
         };
         let (i, a) = place(pixel.u, self.sensor.width, self.nodes_u);
         let (j, b) = place(pixel.v, self.sensor.height, self.nodes_v);
-        let mix = |values: &[[f64; 10]]| {
-            let mut sum = [0.0; 10];
-            for (di, wi) in [(0, 1.0 - a), (1, a)] {
-                for (dj, wj) in [(0, 1.0 - b), (1, b)] {
-                    let value = values[(j + dj) * self.nodes_u + i + di];
-                    for k in 0..10 {
-                        sum[k] += wi * wj * value[k];
-                    }
+        let mut sum = [0.0; 10];
+        for (di, wi) in [(0, 1.0 - a), (1, a)] {
+            for (dj, wj) in [(0, 1.0 - b), (1, b)] {
+                let value = self.calibration_px2[(j + dj) * self.nodes_u + i + di];
+                for k in 0..10 {
+                    sum[k] += wi * wj * value[k];
                 }
             }
-            unpacked(&sum)
-        };
-        (mix(&self.calibration), mix(&self.noise))
+        }
+        unpacked(&sum)
     }
 }
 
@@ -123,14 +121,15 @@ mod tests {
             sensor,
             nodes_u: 4,
             nodes_v: 3,
-            calibration: nodes.clone(),
-            noise: nodes,
+            calibration_px2: nodes,
+            noise_px2: 0.01,
         };
-        let (calibration, _) = grid.at(PixelPoint::new(319.5, 119.5));
+        let calibration = grid.calibration_at(PixelPoint::new(319.5, 119.5));
         assert!((calibration[(0, 0)] - 2.5).abs() < 1e-12);
         assert!((calibration[(3, 0)] - 0.05).abs() < 1e-12);
         // Off the sensor the edge's value holds.
-        assert_eq!(grid.at(PixelPoint::new(-50.0, -50.0)).0[(0, 0)], 1.0);
+        let beyond = grid.calibration_at(PixelPoint::new(-50.0, -50.0));
+        assert_eq!(beyond[(0, 0)], 1.0);
         assert_eq!(grid.node(3, 2), PixelPoint::new(639.5, 479.5));
     }
 

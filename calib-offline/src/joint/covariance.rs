@@ -3,10 +3,10 @@
 use super::estimate::{Estimate, EstimateError};
 use crate::adjust::covariance::{Sighting, sighting_covariance};
 use crate::field::uncertainty::{PairUncertainty, node_pixel, packed};
-use crate::field::{CalibratedCamera, Rig, transport};
+use crate::field::{CalibratedCamera, Rig};
 use crate::geometry::so3::skew;
 use crate::geometry::{PixelPoint, Ray, midpoint_by_shifts};
-use nalgebra::{DMatrix, Matrix2, Matrix3x2, Matrix4, Vector3};
+use nalgebra::{DMatrix, Matrix3x2, Vector3};
 
 /// Nodes of a grid along the longer side of the sensor.
 const NODES_ALONG_LONGER_SIDE: usize = 11;
@@ -45,32 +45,17 @@ impl Estimate {
             let Some(covariance) = without_rigid_motions(&covariance, &by_point, &nodes) else {
                 continue;
             };
-            let pixel_noise = Matrix4::identity() * self.noise.variance_px2;
-            let (calibration, noise) = nodes
-                .iter()
-                .enumerate()
-                .map(|(k, [a, b])| {
-                    let mut rad_per_px = Matrix4::zeros();
-                    rad_per_px
-                        .fixed_view_mut::<2, 2>(0, 0)
-                        .copy_from(&(a.mm_per_px / a.distance_mm));
-                    rad_per_px
-                        .fixed_view_mut::<2, 2>(2, 2)
-                        .copy_from(&(b.mm_per_px / b.distance_mm));
-                    let carry =
-                        |px2: Matrix4<f64>| packed(&(rad_per_px * px2 * rad_per_px.transpose()));
-                    let own = covariance.fixed_view::<4, 4>(4 * k, 4 * k).into_owned();
-                    (carry(own), carry(pixel_noise))
-                })
-                .unzip();
+            let calibration_px2 = (0..nodes.len())
+                .map(|k| packed(&covariance.fixed_view::<4, 4>(4 * k, 4 * k).into_owned()))
+                .collect();
             all.push(PairUncertainty {
                 first: 0,
                 second,
                 sensor: pair[0].field.sensor,
                 nodes_u,
                 nodes_v,
-                calibration,
-                noise,
+                calibration_px2,
+                noise_px2: self.noise.variance_px2,
             });
         }
         rig.uncertainty = all;
@@ -90,12 +75,8 @@ pub(super) struct Node {
     pub(super) sighting: Sighting,
     /// Rig frame.
     ray: Ray,
-    /// The two axes across the ray, rig frame.
-    pub(super) axes: Matrix3x2<f64>,
-    /// Shift of the ray along its axes, at the point, per px.
-    pub(super) mm_per_px: Matrix2<f64>,
-    /// Distance of the point along the ray, mm.
-    distance_mm: f64,
+    /// Shift of the ray at the point, rig frame.
+    pub(super) mm_per_px: Matrix3x2<f64>,
     /// Whether it is the nearest measured place, in place of a node that is not measured.
     stands_in: bool,
 }
@@ -119,15 +100,7 @@ fn nodes(
 ) -> Option<Vec<[Node; 2]>> {
     let (nodes_u, nodes_v) = node_counts(pair[0]);
     let see_both = |pixel: PixelPoint| {
-        let ray = pair[0].ray_in_rig(pixel)?;
-        let point_in_rig = ray.origin_mm + ray.direction.normalize() * distance_mm;
-        let camera_from_rig = pair[1].rig_from_camera.inverse();
-        let other = pair[1]
-            .field
-            .project(&camera_from_rig.point(&point_in_rig))?;
-        if !pair[1].coverage.contains(other) {
-            return None;
-        }
+        let (point_in_rig, other) = pair[0].seen_by(pair[1], pixel, distance_mm)?;
         Some([
             node(indices[0], pair[0], pixel, point_in_rig),
             node(indices[1], pair[1], other, point_in_rig),
@@ -165,21 +138,14 @@ pub(super) fn node(
     pixel: PixelPoint,
     point_in_rig: Vector3<f64>,
 ) -> Node {
-    let sample = camera.field.sample(pixel);
-    let point_in_camera = camera.rig_from_camera.inverse().point(&point_in_rig);
-    let local = transport::frame(&sample.s).tr_mul(&point_in_camera);
-    let by_s = transport::local_point_derivative(&sample.s, &local);
-    let mm_per_px = by_s.fixed_rows::<2>(0) * sample.ds - sample.dm;
     Node {
         sighting: Sighting {
             camera_idx,
             pixel,
             point_in_board: point_in_rig,
         },
-        ray: sample.ray().transformed(&camera.rig_from_camera),
-        axes: camera.rig_from_camera.rotation * transport::across(&sample.s),
-        mm_per_px,
-        distance_mm: local.z,
+        ray: camera.field.ray(pixel).transformed(&camera.rig_from_camera),
+        mm_per_px: camera.ray_shift_mm_per_px(pixel, &point_in_rig),
         stands_in: false,
     }
 }
@@ -191,10 +157,10 @@ pub(super) fn points_by_predictions(nodes: &[[Node; 2]]) -> Option<DMatrix<f64>>
         let (by_a, by_b) = midpoint_by_shifts(&a.ray, &b.ray)?;
         to_points
             .view_mut((3 * k, 4 * k), (3, 2))
-            .copy_from(&(by_a * a.axes * a.mm_per_px));
+            .copy_from(&(by_a * a.mm_per_px));
         to_points
             .view_mut((3 * k, 4 * k + 2), (3, 2))
-            .copy_from(&(by_b * b.axes * b.mm_per_px));
+            .copy_from(&(by_b * b.mm_per_px));
     }
     Some(to_points)
 }

@@ -4,7 +4,7 @@
 use super::covariance::{RIGID_RANK_SHARE, node, points_by_predictions};
 use super::estimate::{Estimate, EstimateError};
 use crate::adjust::covariance::sighting_covariance;
-use crate::field::Rig;
+use crate::field::{Rig, transport};
 use crate::geometry::PixelPoint;
 use crate::geometry::so3::skew;
 use nalgebra::{DMatrix, Matrix2x6, Matrix3, Matrix3x2, Vector3};
@@ -85,10 +85,12 @@ impl Estimate {
             let mut to_mm = DMatrix::zeros(predictions.nrows(), predictions.ncols());
             let mut motions = DMatrix::zeros(predictions.nrows(), 6);
             for (k, node) in nodes.iter().enumerate() {
+                let s = camera.field.sample(node.sighting.pixel).s;
+                let axes = camera.rig_from_camera.rotation * transport::across(&s);
                 to_mm
                     .view_mut((2 * k, 2 * k), (2, 2))
-                    .copy_from(&node.mm_per_px);
-                let across = across_motions(&node.axes, &node.sighting.point_in_board);
+                    .copy_from(&axes.tr_mul(&node.mm_per_px));
+                let across = across_motions(&axes, &node.sighting.point_in_board);
                 motions.view_mut((2 * k, 0), (2, 6)).copy_from(&across);
             }
             let shape = without_motions(&motions)? * to_mm;

@@ -2,8 +2,8 @@
 
 use crate::field::{MeasureError, Rig};
 use crate::geometry::{PixelPoint, RigidTransform, TriangulateError};
-use nalgebra::{RealField, Vector3};
-use ray_runtime::RayBlob;
+use nalgebra::{Matrix3, RealField, Vector3};
+use ray_runtime::{Measurement, RayBlob};
 use std::str::FromStr;
 
 /// The numbers that a source computes with. Pixels are read straight into it and points written
@@ -171,13 +171,18 @@ impl PointSource for BlobSource<'_> {
     fn point(&self, sightings: &[Sighting<f32>]) -> Result<Point<f32>, Status> {
         let pixel =
             |(camera_idx, [u, v]): Sighting<f32>| (camera_idx, ray_runtime::PixelPoint::new(u, v));
+        // A blob knows pairs.
         let result = if let [a, b] = *sightings {
-            self.blob.triangulate(pixel(a), pixel(b))
+            self.blob.triangulate_with_covariance(pixel(a), pixel(b))
         } else {
             let sightings: Vec<_> = sightings.iter().copied().map(pixel).collect();
-            self.blob.triangulate_many(&sightings)
+            let found = self.blob.triangulate_many(&sightings);
+            found.map(|found| Measurement {
+                found,
+                covariance: None,
+            })
         };
-        let found = result.map_err(|error| match error {
+        let Measurement { found, covariance } = result.map_err(|error| match error {
             ray_runtime::MeasureError::Behind => Status::Behind,
             ray_runtime::MeasureError::Parallel => Status::Parallel,
             _ => Status::Outside,
@@ -189,9 +194,23 @@ impl PointSource for BlobSource<'_> {
         Ok(Point {
             point_mm: point_mm.into(),
             gap_mm: found.gap_mm(),
-            sigma_mm: None,
+            sigma_mm: covariance.map(|covariance| match &self.rig_from_frame {
+                // In the blob's own frame these are the device's bits.
+                None => covariance.sigma_mm(),
+                Some(rig_from_frame) => sigma_in_frame(rig_from_frame, &covariance.total_mm2()),
+            }),
         })
     }
+}
+
+fn sigma_in_frame(
+    rig_from_frame: &ray_runtime::RigFromCamera,
+    covariance_mm2: &Matrix3<f32>,
+) -> [f32; 3] {
+    let rotation = &rig_from_frame.rotation;
+    let in_frame = rotation.transpose() * covariance_mm2 * rotation;
+    // Round-off may leave less than nothing of a variance near zero.
+    [0, 1, 2].map(|k| in_frame[(k, k)].max(0.0).sqrt())
 }
 
 fn in_frame(rig_from_frame: &ray_runtime::RigFromCamera, point_mm: &Vector3<f32>) -> Vector3<f32> {

@@ -184,6 +184,7 @@ impl<'a> Search<'a> {
             max_error_px: 1.0,
             working_distance_mm: self.settings.working_distance_mm as f32,
             self_tests: Vec::new(),
+            pairs: Vec::new(),
         };
         let bytes = AlignedBytes::from(parts.encode_cameras(&[(self.camera, &grid)])?.as_slice());
         let blob = RayBlob::open(&bytes)?;

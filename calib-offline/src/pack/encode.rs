@@ -21,6 +21,8 @@ pub struct BlobParts<'a> {
     pub working_distance_mm: f32,
     /// Questions with their answers.
     pub self_tests: Vec<SelfTest>,
+    /// Header and nodes of each pair of cameras whose uncertainty is known, in ascending order.
+    pub pairs: Vec<Vec<u8>>,
 }
 
 impl BlobParts<'_> {
@@ -61,6 +63,11 @@ impl BlobParts<'_> {
             records.extend(record.to_words().iter().flat_map(|word| word.to_le_bytes()));
         }
 
+        for pair in &self.pairs {
+            tables.extend(pair);
+            pad(&mut tables);
+        }
+
         let mut header = Header {
             version: VERSION,
             header_len: HEADER_LEN as u16,
@@ -69,6 +76,7 @@ impl BlobParts<'_> {
             meta_len: length(meta.len())?,
             // More cameras than the count can say are more than the format allows.
             camera_count: u16::try_from(cameras.len()).unwrap_or(u16::MAX),
+            pair_count: u16::try_from(self.pairs.len()).unwrap_or(u16::MAX),
         };
         let mut blob = header.to_bytes().to_vec();
         blob.extend(meta);

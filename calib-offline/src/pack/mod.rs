@@ -3,7 +3,9 @@
 //! Each camera's ray field is resampled onto one control grid (`grid`), the coarsest that holds
 //! the bound (`budget`); the bytes are laid out by the runtime's own schema (`encode`); and
 //! every pixel of the calibrated area is looked up in those bytes by the real runtime and
-//! compared with the f64 field (`proof`). The largest difference is written into the blob.
+//! compared with the f64 field (`proof`). The largest difference is written into the blob. What is
+//! known of the rays' uncertainty goes with it, on a coarse grid (`uncertainty`) whose predictions are
+//! compared with the calibration's (`sigma_error`).
 
 mod aligned_bytes;
 mod banded;
@@ -14,11 +16,14 @@ mod grid;
 mod nearest;
 mod proof;
 mod self_test;
+mod sigma_error;
+mod uncertainty;
 
 pub use aligned_bytes::{AlignedBytes, read_aligned};
 pub use grid::ControlGrid;
 pub use nearest::pack_nearest;
 pub use proof::Proof;
+pub use sigma_error::{Deviation, PackedPair};
 
 use crate::field::Rig;
 use crate::geometry::{PixelPoint, SensorSize};
@@ -36,15 +41,18 @@ pub struct PackSettings {
     pub working_distance_mm: f64,
     /// First bytes of the hash that identifies the calibration.
     pub identity: [u8; IDENTITY_LEN],
+    /// Whether the blob carries what is known of the rays' uncertainty, 648 bytes a pair for smooth lenses.
+    pub with_uncertainty: bool,
 }
 
 impl Default for PackSettings {
-    /// 0.001 px at 1 m, and an identity of zeros.
+    /// 0.001 px at 1 m, an identity of zeros, and the uncertainty.
     fn default() -> Self {
         Self {
             max_error_px: 0.001,
             working_distance_mm: 1000.0,
             identity: [0; IDENTITY_LEN],
+            with_uncertainty: true,
         }
     }
 }
@@ -58,6 +66,8 @@ pub struct Packed {
     pub worst_error_px: f64,
     /// One for each camera, in the rig's order.
     pub grids: Vec<PackedGrid>,
+    /// One for each pair of cameras whose uncertainty the blob carries.
+    pub pairs: Vec<PackedPair>,
     /// What other sizes would cost: bytes of the tables of all cameras, and the worst error, px.
     /// From small to large; each holds a smaller error than the one before. The errors are
     /// those of a sample of the pixels.
@@ -144,6 +154,14 @@ pub enum PackError {
         /// Cells along u and v.
         cells: [u32; 2],
     },
+    /// What a calibration says of a pair's uncertainty is no covariance.
+    #[error("the uncertainty of cameras {first} and {second} is not a covariance")]
+    Uncertainty {
+        /// Index of the first camera.
+        first: usize,
+        /// Index of the second.
+        second: usize,
+    },
     /// No grid holds the bound.
     #[error(
         "camera `{camera}` cannot be packed within {wanted_px} px: \
@@ -194,6 +212,7 @@ pub fn pack(rig: &Rig, settings: &PackSettings) -> Result<Packed, PackError> {
         max_error_px: settings.max_error_px as f32,
         working_distance_mm: settings.working_distance_mm as f32,
         self_tests: Vec::new(),
+        pairs: Vec::new(),
     };
     // The search looked at a sample of the pixels. Now all; a camera that fails gets a finer grid.
     let proofs = loop {
@@ -220,16 +239,27 @@ pub fn pack(rig: &Rig, settings: &PackSettings) -> Result<Packed, PackError> {
             }
         }
         if is_proven {
-            parts.self_tests = self_test::ask(rig, &blob, settings.working_distance_mm);
             break proofs;
         }
     };
 
+    let grids = || chosen.iter().map(|choice| &choice.grid);
+    let distance_mm = settings.working_distance_mm;
+    let pairs = if settings.with_uncertainty {
+        uncertainty::choose(rig, distance_mm, |sections| {
+            parts.pairs = sections.to_vec();
+            parts.encode(rig, grids())
+        })?
+    } else {
+        Vec::new()
+    };
     let worst_error_px = proofs
         .iter()
         .fold(0.0, |worst, p| p.worst_error_px.max(worst));
     parts.max_error_px = encode::rounded_up(worst_error_px);
-    let bytes = parts.encode(rig, chosen.iter().map(|choice| &choice.grid))?;
+    let unasked = AlignedBytes::from(parts.encode(rig, grids())?.as_slice());
+    parts.self_tests = self_test::ask(rig, &RayBlob::open(&unasked)?, distance_mm);
+    let bytes = parts.encode(rig, grids())?;
     RayBlob::open(&AlignedBytes::from(bytes.as_slice()))?
         .run_self_tests()
         .map_err(PackError::SelfTest)?;
@@ -257,6 +287,7 @@ pub fn pack(rig: &Rig, settings: &PackSettings) -> Result<Packed, PackError> {
         bytes,
         worst_error_px,
         grids,
+        pairs,
         curve,
     })
 }

@@ -3,13 +3,15 @@
 use crate::field::{CalibratedCamera, Rig, transport};
 use crate::geometry::{PixelPoint, SensorSize};
 use nalgebra::Vector3;
-use ray_runtime::RayBlob;
 use ray_runtime::format::SelfTest;
+use ray_runtime::{Measurement, RayBlob};
 
 /// Rays asked of each camera.
 const RAYS: usize = 2;
 /// Matches asked of the first camera with each other one.
 const PAIRS: usize = 4;
+/// How many of those are asked for their standard deviations too, where the blob knows them.
+const SIGMAS: usize = 2;
 /// Places of the questions on the sensor, as shares of its width and height. They are spread and
 /// lie on no symmetry; those outside the calibrated area are passed over.
 const PLACES: [(f64, f64); 12] = [
@@ -43,8 +45,12 @@ pub fn ask(rig: &Rig, blob: &RayBlob<'_>, working_distance_mm: f64) -> Vec<SelfT
             let point = ray.origin_mm + ray.direction.normalize() * working_distance_mm;
             Some((pixel, pixel_nearest(other, &point)?))
         });
-        let pairs = matches.filter_map(|(a, b)| ask_pair(blob, [0, k + 1], [a, b]));
-        tests.extend(pairs.take(PAIRS));
+        let matches: Vec<_> = matches
+            .filter_map(|(a, b)| Asked::new(blob, [0, k + 1], [a, b]))
+            .take(PAIRS)
+            .collect();
+        tests.extend(matches.iter().map(Asked::pair));
+        tests.extend(matches.iter().filter_map(Asked::sigma).take(SIGMAS));
     }
     tests
 }
@@ -71,17 +77,41 @@ fn ask_ray(blob: &RayBlob<'_>, camera: usize, pixel: PixelPoint) -> Option<SelfT
     })
 }
 
-fn ask_pair(blob: &RayBlob<'_>, cameras: [usize; 2], pixels: [PixelPoint; 2]) -> Option<SelfTest> {
-    let pixels = pixels.map(device_pixel);
-    let result = blob
-        .triangulate((cameras[0], pixels[0]), (cameras[1], pixels[1]))
-        .ok()?;
-    Some(SelfTest::Pair {
-        cameras: cameras.map(|camera| camera as u16),
-        pixels: pixels.map(|pixel| [pixel.u, pixel.v]),
-        point_mm: result.point_mm.into(),
-        gap_squared_mm2: result.gap_squared_mm2,
-    })
+/// A match and its answer.
+struct Asked {
+    cameras: [u16; 2],
+    pixels: [[f32; 2]; 2],
+    answer: Measurement,
+}
+
+impl Asked {
+    fn new(blob: &RayBlob<'_>, cameras: [usize; 2], pixels: [PixelPoint; 2]) -> Option<Self> {
+        let pixels = pixels.map(device_pixel);
+        let [a, b] = [0, 1].map(|k| (cameras[k], pixels[k]));
+        Some(Self {
+            cameras: cameras.map(|camera| camera as u16),
+            pixels: pixels.map(|pixel| [pixel.u, pixel.v]),
+            answer: blob.triangulate_with_covariance(a, b).ok()?,
+        })
+    }
+
+    fn pair(&self) -> SelfTest {
+        let found = self.answer.found;
+        SelfTest::Pair {
+            cameras: self.cameras,
+            pixels: self.pixels,
+            point_mm: found.point_mm.into(),
+            gap_squared_mm2: found.gap_squared_mm2,
+        }
+    }
+
+    fn sigma(&self) -> Option<SelfTest> {
+        Some(SelfTest::Sigma {
+            cameras: self.cameras,
+            pixels: self.pixels,
+            sigma_mm: self.answer.covariance?.sigma_mm(),
+        })
+    }
 }
 
 fn device_pixel(pixel: PixelPoint) -> ray_runtime::PixelPoint {

@@ -99,6 +99,7 @@ fn settings(max_error_px: f64) -> PackSettings {
         max_error_px,
         working_distance_mm: 600.0,
         identity: *b"0123456789abcdef",
+        ..PackSettings::default()
     }
 }
 
@@ -240,6 +241,7 @@ fn parts() -> encode::BlobParts<'static> {
         max_error_px: 1.0,
         working_distance_mm: 600.0,
         self_tests: Vec::new(),
+        pairs: Vec::new(),
     }
 }
 

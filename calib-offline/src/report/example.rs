@@ -10,10 +10,13 @@ use crate::evaluate::central_model::CentralModel;
 use crate::evaluate::centrality::Centrality;
 use crate::evaluate::half_data::{HalfData, HalfDataCheck};
 use crate::evaluate::working_volume::PointDifference;
-use crate::field::{BaseLens, CalibratedCamera, CoverageMask, Projection, RayField, Rig};
+use crate::field::uncertainty::packed;
+use crate::field::{
+    BaseLens, CalibratedCamera, CoverageMask, PairUncertainty, Projection, RayField, Rig,
+};
 use crate::geometry::{PixelPoint, RigidTransform, SensorSize, so3};
 use crate::joint::{Alternative, Choice, Family, SmoothnessFound};
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Matrix4, Vector2, Vector3};
 
 const SENSOR: SensorSize = SensorSize::new(1280, 1024);
 const FOCAL_PX: f64 = 2400.0;
@@ -84,7 +87,7 @@ pub fn calibration() -> Calibration {
             terms: vec![(2, 0, 0.03), (0, 2, -0.02)],
         },
         rig: Rig {
-            uncertainty: Vec::new(),
+            uncertainty: vec![uncertainty()],
             cameras,
             datum_pose: 8,
         },
@@ -119,16 +122,44 @@ fn camera(
     rig_from_camera: RigidTransform,
     corners: &[CornerRecord],
 ) -> CalibratedCamera {
-    let base = BaseLens {
-        projection: Projection::Perspective,
-        focal_px: FOCAL_PX,
-    };
+    let base = BaseLens::ideal(Projection::Perspective, FOCAL_PX);
     let own = corners.iter().filter(|c| c.camera_idx == camera_idx);
     CalibratedCamera {
         name: name.to_owned(),
         field: RayField::ideal(SENSOR, base, 3),
         coverage: CoverageMask::from_corners(SENSOR, own.map(|c| c.observed)),
         rig_from_camera,
+    }
+}
+
+/// Rays that are known the better the nearer they are to the middle of the image; errors of both
+/// cameras go together.
+fn uncertainty() -> PairUncertainty {
+    let (nodes_u, nodes_v) = (5, 4);
+    let node = |k: usize| {
+        let from_middle =
+            |index: usize, count: usize| 2.0 * index as f64 / (count - 1) as f64 - 1.0;
+        let (x, y) = (
+            from_middle(k % nodes_u, nodes_u),
+            from_middle(k / nodes_u, nodes_v),
+        );
+        let sigma_px = 0.01 * (1.0 + 2.0 * (x * x + y * y));
+        let factor = Matrix4::new(
+            1.0, 0.0, 0.0, 0.0, //
+            0.0, 1.0, 0.0, 0.0, //
+            0.8, 0.0, 0.6, 0.0, //
+            0.0, 0.8, 0.0, 0.6,
+        ) * sigma_px;
+        packed(&(factor * factor.transpose()))
+    };
+    PairUncertainty {
+        first: 0,
+        second: 1,
+        sensor: SENSOR,
+        nodes_u,
+        nodes_v,
+        calibration_px2: (0..nodes_u * nodes_v).map(node).collect(),
+        noise_px2: SIGMA_PX * SIGMA_PX,
     }
 }
 

@@ -3,7 +3,9 @@
 use super::choices_page;
 use super::facts::Facts;
 use super::left_out_page;
-use super::plot::{Figure, cost, coverage, histogram, pose_rms, residual_vectors, scene};
+use super::plot::{
+    Figure, cost, coverage, histogram, pose_rms, residual_vectors, scene, uncertainty_map,
+};
 use super::record::{Calibration, HeldOutRecord};
 use super::text::short;
 use super::words;
@@ -175,6 +177,8 @@ fn figures(calibration: &Calibration) -> Markup {
     html! {
         (group("Coverage", &coverage::draw(calibration),
             "Each dot is a corner. Shaded parts of the sensor are not calibrated: a pixel there gets no ray. Good: dots everywhere, to the edges. To enlarge the calibrated area, record poses with the board over the shaded parts."))
+        (group("Uncertainty of points", &uncertainty_map::draw(calibration),
+            "Predicted from the estimate, as if nothing were wrong with the model: compare with the held-out errors above. Good: even colors where you measure. The calibration alone grows towards the border of the calibrated area: record more poses there if it matters. A rigid motion of all points together is not in it."))
         (group("Residual vectors", &residual_vectors::draw(calibration),
             "Each line is what the model did not explain at one corner, colored by its direction. Good: short lines in mixed colors. Bad: neighbors with one color, which is a pattern that noise does not make: a lens the model cannot follow, a bent board, or something that moved between the cameras."))
         (group("Distribution", histogram::draw(calibration).as_slice(),
@@ -267,8 +271,8 @@ mod tests {
         ] {
             assert!(page.contains(part), "{part} is not in the page");
         }
-        assert_eq!(page.matches("<svg").count(), 9);
-        assert_eq!(page.matches("How to read this").count(), 8);
+        assert_eq!(page.matches("<svg").count(), 11);
+        assert_eq!(page.matches("How to read this").count(), 9);
     }
 
     #[test]

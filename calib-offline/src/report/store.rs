@@ -4,7 +4,7 @@
 use super::Calibration;
 use super::record::SCHEMA;
 use crate::field::polynomial::{MAX_DEGREE, term_count};
-use crate::field::{CalibratedCamera, SmoothMap};
+use crate::field::{CalibratedCamera, PairUncertainty, SmoothMap};
 use ray_runtime::format::IDENTITY_LEN;
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
@@ -160,6 +160,13 @@ impl Calibration {
                 "a pose has not one RMS per camera",
             ),
             (
+                self.rig
+                    .uncertainty
+                    .iter()
+                    .all(|pair| pair_is_whole(pair, cameras)),
+                "the uncertainty of a pair of cameras has the wrong length or is not finite",
+            ),
+            (
                 self.board.rows > 0 && self.board.cols > 0 && self.board.square_mm > 0.0,
                 "the board has no size",
             ),
@@ -189,6 +196,18 @@ fn camera_contradiction(camera: &CalibratedCamera) -> Option<&'static str> {
         return Some("the ray field of a camera has a table of the wrong length");
     }
     None
+}
+
+fn pair_is_whole(pair: &PairUncertainty, cameras: &[CalibratedCamera]) -> bool {
+    let nodes = pair.nodes_u.checked_mul(pair.nodes_v);
+    pair.first < pair.second
+        && pair.second < cameras.len()
+        && pair.sensor == cameras[pair.first].field.sensor
+        && pair.nodes_u.min(pair.nodes_v) >= 2
+        && nodes == Some(pair.calibration_px2.len())
+        && pair.calibration_px2.iter().flatten().all(|x| x.is_finite())
+        && pair.noise_px2 >= 0.0
+        && pair.noise_px2.is_finite()
 }
 
 fn map_is_whole(map: &SmoothMap) -> bool {

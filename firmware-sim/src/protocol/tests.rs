@@ -79,11 +79,11 @@ fn bytes_of_answers() {
     let hello = Hello {
         device: name("ab"),
         firmware: name("0.1"),
-        max_matches: 32,
+        max_matches: 28,
     };
     assert_bytes(
         &Reply::Hello(hello),
-        &[1, 2, b'a', b'b', 3, b'0', b'.', b'1', 32],
+        &[1, 2, b'a', b'b', 3, b'0', b'.', b'1', 28],
     );
 
     let without = Status {
@@ -121,20 +121,30 @@ fn bytes_of_answers() {
     let point = Point {
         point_mm: [1.0, 2.0, -2.0],
         gap_squared_mm2: 0.5,
+        sigma_mm: None,
     };
     let found = Measured {
         id: 1,
         outcome: Ok(point),
+    };
+    let with_sigma = Measured {
+        id: 3,
+        outcome: Ok(Point {
+            sigma_mm: Some([1.0, 0.5, 2.0]),
+            ..point
+        }),
     };
     let refused = Measured {
         id: 2,
         outcome: Err(64),
     };
     #[rustfmt::skip]
-    assert_bytes(&Reply::Measured(vec(&[found, refused])), &[
-        3, 2,
-        1, 0, 0, 0, 0x80, 0x3f, 0, 0, 0, 0x40, 0, 0, 0, 0xc0, 0, 0, 0, 0x3f,
+    assert_bytes(&Reply::Measured(vec(&[found, refused, with_sigma])), &[
+        3, 3,
+        1, 0, 0, 0, 0x80, 0x3f, 0, 0, 0, 0x40, 0, 0, 0, 0xc0, 0, 0, 0, 0x3f, 0,
         2, 1, 64,
+        3, 0, 0, 0, 0x80, 0x3f, 0, 0, 0, 0x40, 0, 0, 0, 0xc0, 0, 0, 0, 0x3f,
+        1, 0, 0, 0x80, 0x3f, 0, 0, 0, 0x3f, 0, 0, 0, 0x40,
     ]);
 }
 
@@ -154,6 +164,7 @@ fn the_longest_messages_fit_a_frame() {
     let point = Point {
         point_mm: [f32::MAX; 3],
         gap_squared_mm2: f32::MAX,
+        sigma_mm: Some([f32::MAX; 3]),
     };
     let found = Measured {
         id: u32::MAX,

@@ -1,12 +1,13 @@
 //! A stereo blob made by hand from the runtime's schema, and matches on it: small, but with a
-//! central and a non-central camera, knots that no formula gives, and a hole in a mask.
+//! central and a non-central camera, knots and nodes that no formula gives, and a hole in a mask.
 
 use firmware_sim::protocol::{Match, Sighting};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use ray_runtime::format::{
     ALIGNMENT, Axis, CRC_OFFSET, CameraMeta, Encoding, HEADER_LEN, Header, LengthUnit, Meta,
-    PixelConvention, RECORD_LEN, RecordFields, VERSION, aligned, checksum, grid_len, mask_len,
+    NODE_LEN, PairHeader, PixelConvention, RECORD_LEN, RecordFields, VERSION, aligned, checksum,
+    grid_len, mask_len,
 };
 
 use serde::Serialize;
@@ -73,6 +74,9 @@ pub fn blob() -> Vec<u8> {
         records.extend(record.to_words().iter().flat_map(|word| word.to_le_bytes()));
     }
 
+    tables.extend(pair());
+    tables.resize(aligned(tables.len()), 0);
+
     let header = Header {
         version: VERSION,
         header_len: HEADER_LEN as u16,
@@ -80,6 +84,7 @@ pub fn blob() -> Vec<u8> {
         crc: 0,
         meta_len: meta.len() as u32,
         camera_count: CAMERAS.len() as u16,
+        pair_count: 1,
     };
     let mut blob = header.to_bytes().to_vec();
     blob.extend(meta);
@@ -114,6 +119,22 @@ fn grid(camera: usize, encoding: Encoding) -> Vec<u8> {
         }
     }
     bytes
+}
+
+/// The uncertainty of the two cameras: any bytes at all are nodes.
+fn pair() -> Vec<u8> {
+    let mut random = ChaCha8Rng::seed_from_u64(2);
+    let header = PairHeader {
+        cameras: [0, 1],
+        nodes: [5, 4],
+        first_px: [20.25, -0.5],
+        nodes_per_px: [1.0 / 150.0, 1.0 / 160.0],
+        step_px: 3e-5,
+        noise_px2: 0.0025,
+    };
+    let mut nodes = vec![0; 5 * 4 * NODE_LEN];
+    random.fill(&mut nodes[..]);
+    [&header.to_bytes()[..], &nodes].concat()
 }
 
 /// Everything calibrated, but for the first 8 mask cells of the left camera.

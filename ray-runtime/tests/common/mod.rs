@@ -4,8 +4,8 @@
 #![allow(dead_code)]
 
 use ray_runtime::format::{
-    self, Axis, CameraMeta, Encoding, HEADER_LEN, Header, LengthUnit, Meta, PixelConvention,
-    RECORD_LEN, RecordFields, SelfTest, VERSION,
+    self, Axis, CameraMeta, Encoding, HEADER_LEN, Header, LengthUnit, Meta, PairHeader,
+    PixelConvention, RECORD_LEN, RecordFields, SelfTest, VERSION,
 };
 
 /// Bytes that start on a multiple of 8.
@@ -129,9 +129,45 @@ impl TestCamera {
     }
 }
 
+/// The uncertainty of a pair, the same at every node.
+#[derive(Clone)]
+pub struct TestPair {
+    pub header: PairHeader,
+    /// Scale and the ten numbers of the lower triangle.
+    pub node: [u8; format::NODE_LEN],
+}
+
+impl TestPair {
+    /// 3 x 2 nodes over a sensor of 64 x 48 px; steps of 0.001 px, noise of 0.1 px.
+    pub fn new(cameras: [u16; 2]) -> Self {
+        Self {
+            header: PairHeader {
+                cameras,
+                nodes: [3, 2],
+                first_px: [-0.5, -0.5],
+                nodes_per_px: [2.0 / 64.0, 1.0 / 48.0],
+                step_px: 0.001,
+                noise_px2: 0.01,
+            },
+            node: [2, 50, 0, 50, 20, 0, 30, 0, 0xf6, 5, 40],
+        }
+    }
+
+    fn bytes(&self) -> Vec<u8> {
+        let [nodes_u, nodes_v] = self.header.nodes;
+        let mut bytes = self.header.to_bytes().to_vec();
+        bytes.extend(
+            self.node
+                .repeat(usize::from(nodes_u) * usize::from(nodes_v)),
+        );
+        bytes
+    }
+}
+
 /// The parts of a blob, each of which a test may spoil.
 pub struct TestBlob {
     pub cameras: Vec<TestCamera>,
+    pub pairs: Vec<TestPair>,
     pub max_error_px: f32,
     pub identity: Vec<u8>,
     pub self_tests: Vec<SelfTest>,
@@ -141,6 +177,7 @@ impl TestBlob {
     pub fn new(cameras: Vec<TestCamera>) -> Self {
         Self {
             cameras,
+            pairs: Vec::new(),
             max_error_px: 0.001,
             identity: (0..16).collect(),
             self_tests: Vec::new(),
@@ -194,6 +231,10 @@ impl TestBlob {
             };
             records.extend(fields.to_words().iter().flat_map(|w| w.to_le_bytes()));
         }
+        for pair in &self.pairs {
+            tables.extend(pair.bytes());
+            pad(&mut tables);
+        }
         let header = Header {
             version: VERSION,
             header_len: HEADER_LEN as u16,
@@ -201,6 +242,7 @@ impl TestBlob {
             crc: 0,
             meta_len: metadata.len() as u32,
             camera_count: self.cameras.len() as u16,
+            pair_count: self.pairs.len() as u16,
         };
         let mut blob = header.to_bytes().to_vec();
         blob.extend(metadata);

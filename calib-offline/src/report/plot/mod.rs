@@ -11,6 +11,7 @@ pub mod pose_rms;
 pub mod residual_vectors;
 pub mod scene;
 pub mod svg;
+pub mod uncertainty_map;
 
 /// Width of every drawing, units.
 pub const WIDTH: f64 = 400.0;

@@ -1,5 +1,6 @@
 //! Opens the blob at the start of the flash, runs its self-tests, which compare bits, and
-//! triangulates a few matches of cameras 0 and 1, printed to a tenth of a millimeter.
+//! triangulates a few matches of cameras 0 and 1, printed to a tenth of a millimeter with their
+//! standard deviations.
 
 #![no_std]
 #![no_main]
@@ -55,8 +56,10 @@ fn main() -> ! {
         }
     }
     for [u0, v0, u1, v1] in MATCHES {
-        match blob.triangulate((0, PixelPoint::new(u0, v0)), (1, PixelPoint::new(u1, v1))) {
-            Ok(found) => {
+        let (a, b) = (PixelPoint::new(u0, v0), PixelPoint::new(u1, v1));
+        match blob.triangulate_with_covariance((0, a), (1, b)) {
+            Ok(measured) => {
+                let found = measured.found;
                 let [x, y, z]: [f32; 3] = found.point_mm.into();
                 hprintln!(
                     "point {:.1} {:.1} {:.1} mm, gap {:.1} mm",
@@ -65,6 +68,10 @@ fn main() -> ! {
                     z,
                     found.gap_mm()
                 );
+                if let Some(covariance) = measured.covariance {
+                    let [x, y, z] = covariance.sigma_mm();
+                    hprintln!("sigma {:.2} {:.2} {:.2} mm", x, y, z);
+                }
             }
             Err(error) => hprintln!("{}", error),
         }
