@@ -30,6 +30,11 @@ impl KnotOrder {
         }
     }
 
+    /// Cells along the side with more of them.
+    pub fn cells_along_longer_side(&self) -> usize {
+        self.grid.cells_u.max(self.grid.cells_v)
+    }
+
     /// Number of knots.
     pub fn knot_count(&self) -> usize {
         self.grid.knot_count()

@@ -2,6 +2,7 @@
 //! not. Every alternative that was tried is reported with its evidence.
 
 use super::estimate::EstimateError;
+use super::evidence::Family;
 use super::fit::Fit;
 use super::rebase::rebase;
 use crate::adjust::{Model, Observations};
@@ -15,6 +16,8 @@ const FINER_CELLS: [f64; 2] = [32.0, 46.0];
 /// Degree of the offset's polynomial: a cubic follows windows and flat ports, the higher degrees,
 /// held back by weights of their own, curved ports and mirrors.
 const OFFSET_DEGREE: usize = 7;
+/// Share of a spline's numbers that the data determine, above which a finer one is tried.
+const USED_UP: f64 = 0.6;
 /// Rounds after a change of the model, at most; twice as many if it is the best so far.
 const ROUNDS: usize = 8;
 /// A round that changes twice the log evidence by less settles the fit.
@@ -37,6 +40,8 @@ const MOST_REBASES: usize = 3;
 pub enum Alternative {
     /// Every camera gets an offset: its rays need not meet in one point.
     Offsets,
+    /// The same from another start: the polynomials of the directions are held back at first.
+    OffsetsFirst,
     /// The same, and the splines go.
     OffsetsForSpline,
     /// The lenses underneath are fitted anew, as offsets explain part of what they did.
@@ -94,7 +99,8 @@ impl Candidate {
             evidence = now;
             let hopeless = rival - now > HOPELESS_GAP + HOPELESS_CHANGES * change;
             // Only what wins is worth more rounds; unsettled, it would lose to itself.
-            let decided = round + 1 >= ROUNDS && now - rival < NEEDED_GAIN;
+            let wins = rival.is_finite() && now - rival >= NEEDED_GAIN;
+            let decided = round + 1 >= ROUNDS && !wins;
             if change < SETTLED || hopeless || decided {
                 break;
             }
@@ -112,7 +118,7 @@ pub fn choose(start: Candidate, observations: &Observations) -> (Candidate, Vec<
     };
     search.structure();
     for cells in FINER_CELLS {
-        if search.best.fit.model.has_spline() && !search.spline(cells) {
+        if !search.spline_is_used_up() || !search.spline(cells) {
             break;
         }
     }
@@ -167,14 +173,31 @@ impl Search<'_> {
         }
     }
 
+    /// Whether the data determine so many of a spline's numbers that finer ones could be wanted;
+    /// else they would only be held by the smoothness.
+    fn spline_is_used_up(&self) -> bool {
+        let model = &self.best.fit.model;
+        let found = self.best.fit.smoothness.found(model);
+        found.iter().any(|found| {
+            found.family == Family::Spline && found.effective > USED_UP * found.parameters as f64
+        })
+    }
+
     fn spline(&mut self, cells: f64) -> bool {
         self.take_if_better(Alternative::Spline { cells }, NEEDED_GAIN, |model| {
             set_spline(model, cells);
         })
     }
 
+    /// Offsets, from two starts: held back, so that they explain what nothing else does; and free
+    /// while the polynomials are held back. Where boards stood at much the same distance, one can
+    /// stand for the other, and weights do not find from one such model to the other.
     fn offsets(&mut self) -> bool {
-        self.take_if_better(Alternative::Offsets, NEEDED_GAIN, add_offsets)
+        let late = self.take_if_better(Alternative::Offsets, NEEDED_GAIN, add_offsets);
+        let needed = if late { 0.0 } else { NEEDED_GAIN };
+        let mut fit = self.best.fit.changed(self.observations, add_offsets);
+        fit.smoothness.put_offsets_first();
+        self.take_fit_if_better(Alternative::OffsetsFirst, needed, fit) || late
     }
 
     /// Offsets on the best model, against a rival that is none of its own.
@@ -208,7 +231,11 @@ impl Search<'_> {
         for camera_idx in 0..self.best.fit.model.cameras.len() {
             if self.best.fit.model.cameras[camera_idx].offset().is_some() {
                 let tried = Alternative::Central { camera_idx };
-                changed |= self.take_if_better(tried, -NEEDED_GAIN, |model| {
+                // Where another camera has offsets, a tie is no reason to think this one unlike it.
+                let cameras = &self.best.fit.model.cameras;
+                let alone = cameras.iter().filter(|c| c.offset().is_some()).count() == 1;
+                let needed = if alone { -NEEDED_GAIN } else { NEEDED_GAIN };
+                changed |= self.take_if_better(tried, needed, |model| {
                     model.cameras[camera_idx].drop_offset();
                 });
             }
@@ -224,9 +251,13 @@ impl Search<'_> {
         needed: f64,
         change: impl FnOnce(&mut Model),
     ) -> bool {
-        // A model that the data leave open has no evidence for it; the one so far stands.
         let changed = self.best.fit.changed(self.observations, change);
-        let settled = Candidate::settle(changed, self.best.evidence, self.observations).ok();
+        self.take_fit_if_better(tried, needed, changed)
+    }
+
+    fn take_fit_if_better(&mut self, tried: Alternative, needed: f64, fit: Fit) -> bool {
+        // A model that the data leave open has no evidence for it; the one so far stands.
+        let settled = Candidate::settle(fit, self.best.evidence, self.observations).ok();
         let gain = settled
             .as_ref()
             .map(|candidate| candidate.evidence - self.best.evidence);

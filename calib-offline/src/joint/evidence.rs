@@ -12,12 +12,13 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Inverse variances at the start: directions may move by 1e-3 rad, a spline's second differences
-/// by 3e-5 rad, an offset by 1e-3 mm. The offset starts nearly central on purpose: started free it
+/// Inverse variances at the start: directions may move by 1e-3 rad, an offset by 1e-3 mm, a
+/// spline's second differences by what residuals are then. The offset starts nearly central on purpose: started free it
 /// absorbs what a spline has not resolved yet and is slow to let go (METHOD 2.4).
 const START_DIRECTION: f64 = 1e6;
-const START_SPLINE: f64 = 1e9;
 const START_OFFSET: f64 = 1e6;
+/// Where offsets go first: they may move by 0.1 mm.
+const FREE_OFFSET: f64 = 1e2;
 /// Beyond this a parameter is held to round-off and a larger weight changes nothing.
 const MOST_PRECISION: f64 = 1e14;
 /// Longest step of a weight's logarithm in one update.
@@ -110,7 +111,7 @@ impl Smoothness {
     /// Weights for everything that a model has, each family at its start.
     pub fn new(model: &Model) -> Self {
         let mut smoothness = Self::default();
-        smoothness.cover(model);
+        smoothness.cover(model, 1.0);
         smoothness
     }
 
@@ -124,9 +125,11 @@ impl Smoothness {
     }
 
     /// Fits the families to a model: known ones keep their weights, new ones get their start,
-    /// those that are gone are dropped. A spline keeps its weight over a change of grid scaled
-    /// by the fourth power of the spacing, as second differences scale by its square.
-    pub fn cover(&mut self, model: &Model) {
+    /// those that are gone are dropped. Over a change of grid, a spline's weight is scaled by the
+    /// fourth power of the spacing, as second differences scale by its square.
+    ///
+    /// `variance_px2` is that of the residuals so far, per axis: what a new spline may follow.
+    pub fn cover(&mut self, model: &Model, variance_px2: f64) {
         let old = std::mem::take(&mut self.groups);
         for (camera_idx, camera) in model.cameras.iter().enumerate() {
             for (family, members) in families(camera) {
@@ -135,7 +138,7 @@ impl Smoothness {
                     .find(|g| g.camera_idx == camera_idx && g.family == family);
                 let start = match family {
                     Family::Direction(_) => START_DIRECTION,
-                    Family::Spline => START_SPLINE,
+                    Family::Spline => camera.field.base.focal_px.powi(2) / variance_px2,
                     Family::Pupil | Family::Offset(_) => START_OFFSET,
                 };
                 let energy = camera
@@ -150,16 +153,27 @@ impl Smoothness {
                             .map_or_else(|| Arc::new(SplineEnergy::new(order)), Arc::clone)
                     });
                 self.groups.push(Group {
-                    energy,
                     camera_idx,
                     family,
                     members,
-                    precision: known.map_or(start, |g| g.precision),
+                    precision: known.map_or(start, |g| g.precision * g.rescaled(energy.as_ref())),
+                    energy,
                     last_log_step: 0.0,
                     growth: 1.0,
                     effective: 0.0,
                 });
             }
+        }
+    }
+
+    /// Frees offsets and holds back the penalized polynomials of directions, to start from.
+    pub fn put_offsets_first(&mut self) {
+        for group in &mut self.groups {
+            group.precision = match group.family {
+                Family::Direction(_) => MOST_PRECISION,
+                Family::Pupil | Family::Offset(_) => FREE_OFFSET,
+                Family::Spline => continue,
+            };
         }
     }
 
@@ -266,6 +280,15 @@ impl Smoothness {
 }
 
 impl Group {
+    /// What a spline's weight is multiplied by if its grid changes to that of `next`.
+    fn rescaled(&self, next: Option<&Arc<SplineEnergy>>) -> f64 {
+        let cells = |energy: &Arc<SplineEnergy>| energy.order.cells_along_longer_side() as f64;
+        match (&self.energy, next) {
+            (Some(now), Some(next)) => (cells(next) / cells(now)).powi(4),
+            _ => 1.0,
+        }
+    }
+
     fn step(&mut self, dimension: f64, trace: f64, energy: f64) {
         self.effective = (dimension - self.precision * trace).clamp(1e-6 * dimension, dimension);
         let wanted = (self.effective / energy.max(f64::MIN_POSITIVE)).min(MOST_PRECISION);

@@ -69,7 +69,7 @@ impl Fit {
     pub fn changed(&self, observations: &Observations, change: impl FnOnce(&mut Model)) -> Self {
         let mut next = self.clone();
         change(&mut next.model);
-        next.smoothness.cover(&next.model);
+        next.smoothness.cover(&next.model, next.noise.variance_px2);
         next.bases = next.model.changed_view_bases(observations, &self.bases);
         next.residuals = normal_equations::residuals(&next.model, observations, &next.bases);
         next

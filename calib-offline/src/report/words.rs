@@ -150,6 +150,7 @@ fn skipped(reason: Skipped) -> String {
 pub fn alternative(choice: &Choice, calibration: &Calibration) -> String {
     match choice.tried {
         Alternative::Offsets => "offsets: rays that need not meet in one point".to_owned(),
+        Alternative::OffsetsFirst => "offsets before penalized polynomials".to_owned(),
         Alternative::OffsetsForSpline => "offsets in place of the spline".to_owned(),
         Alternative::Lenses => "base lenses fitted anew".to_owned(),
         Alternative::Spline { cells } => {
