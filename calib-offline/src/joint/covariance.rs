@@ -10,6 +10,9 @@ use nalgebra::{DMatrix, Matrix3x2, Vector3};
 
 /// Nodes of a grid along the longer side of the sensor.
 const NODES_ALONG_LONGER_SIDE: usize = 11;
+/// Of the coarser grids at the least and largest distance of boards, which say with it what moves
+/// rigidly.
+const VOLUME_NODES_ALONG_LONGER_SIDE: usize = 8;
 /// Singular values below this count as zero: a rigid motion that moves no point (mm per rad or mm).
 pub(super) const RIGID_RANK_SHARE: f64 = 1e-9;
 
@@ -18,7 +21,11 @@ impl Estimate {
     ///
     /// Both cameras of a pair are asked where they see a point at the working distance that is
     /// fixed in the datum frame. What a rigid motion of the whole rig explains is taken out, as it
-    /// changes no measured shape: so this is not the uncertainty of the datum itself.
+    /// changes no measured shape: so this is not the uncertainty of the datum itself. The motion is
+    /// that of points through the whole depth in which boards stood; of those at one distance alone
+    /// it would explain much of what changes the shape.
+    ///
+    /// The noise of pixels is taken to be that of the corners that were not rejected.
     ///
     /// Cameras that never see the same point at the working distance get no entry.
     ///
@@ -26,14 +33,20 @@ impl Estimate {
     /// [`EstimateError::Singular`] if the data leave a parameter open.
     pub fn fill_uncertainty(&mut self, rig: &mut Rig) -> Result<(), EstimateError> {
         let (layout, equations, reduced) = self.fit.equations(&self.observations)?;
-        let distance_mm = self.working_distance_mm(rig);
+        let distances = self.board_distances_mm(rig);
+        let Some(distance_mm) = distances.get(distances.len() / 2).copied() else {
+            return Ok(());
+        };
         let mut all = Vec::new();
         for second in 1..rig.cameras.len() {
             let pair = [&rig.cameras[0], &rig.cameras[second]];
-            let (nodes_u, nodes_v) = node_counts(pair[0]);
-            let Some(nodes) = nodes([0, second], pair, distance_mm) else {
+            let (nodes_u, nodes_v) = node_counts(pair[0], NODES_ALONG_LONGER_SIDE);
+            let Some(mut nodes) = nodes([0, second], pair, distance_mm) else {
                 continue;
             };
+            for distance_mm in distances.first().into_iter().chain(distances.last()) {
+                nodes.extend(volume_nodes([0, second], pair, *distance_mm));
+            }
             let sightings: Vec<Sighting> =
                 nodes.iter().flatten().map(|node| node.sighting).collect();
             // The datum is the first pose.
@@ -45,7 +58,7 @@ impl Estimate {
             let Some(covariance) = without_rigid_motions(&covariance, &by_point, &nodes) else {
                 continue;
             };
-            let calibration_px2 = (0..nodes.len())
+            let calibration_px2 = (0..nodes_u * nodes_v)
                 .map(|k| packed(&covariance.fixed_view::<4, 4>(4 * k, 4 * k).into_owned()))
                 .collect();
             all.push(PairUncertainty {
@@ -55,17 +68,11 @@ impl Estimate {
                 nodes_u,
                 nodes_v,
                 calibration_px2,
-                noise_px2: self.noise.variance_px2,
+                noise_px2: self.fit.pixel_variance_px2(&self.observations),
             });
         }
         rig.uncertainty = all;
         Ok(())
-    }
-
-    /// Median distance from the first camera to the boards, mm.
-    fn working_distance_mm(&self, rig: &Rig) -> f64 {
-        let distances = self.board_distances_mm(rig);
-        distances.get(distances.len() / 2).copied().unwrap_or(1.0)
     }
 }
 
@@ -81,11 +88,11 @@ pub(super) struct Node {
     stands_in: bool,
 }
 
-fn node_counts(camera: &CalibratedCamera) -> (usize, usize) {
+fn node_counts(camera: &CalibratedCamera, along_longer_side: usize) -> (usize, usize) {
     let sensor = camera.field.sensor;
     let longer = f64::from(sensor.width.max(sensor.height));
     let count = |extent: u32| {
-        ((NODES_ALONG_LONGER_SIDE as f64 * f64::from(extent) / longer).round() as usize).max(2)
+        ((along_longer_side as f64 * f64::from(extent) / longer).round() as usize).max(2)
     };
     (count(sensor.width), count(sensor.height))
 }
@@ -98,14 +105,8 @@ fn nodes(
     pair: [&CalibratedCamera; 2],
     distance_mm: f64,
 ) -> Option<Vec<[Node; 2]>> {
-    let (nodes_u, nodes_v) = node_counts(pair[0]);
-    let see_both = |pixel: PixelPoint| {
-        let (point_in_rig, other) = pair[0].seen_by(pair[1], pixel, distance_mm)?;
-        Some([
-            node(indices[0], pair[0], pixel, point_in_rig),
-            node(indices[1], pair[1], other, point_in_rig),
-        ])
-    };
+    let (nodes_u, nodes_v) = node_counts(pair[0], NODES_ALONG_LONGER_SIDE);
+    let see_both = |pixel: PixelPoint| see_both(indices, pair, pixel, distance_mm);
     let measured: Vec<(PixelPoint, [Node; 2])> = pair[0]
         .coverage
         .covered_middles()
@@ -129,6 +130,36 @@ fn nodes(
             })
         })
         .collect()
+}
+
+/// Coarser nodes at another distance, where both cameras measure.
+fn volume_nodes(
+    indices: [usize; 2],
+    pair: [&CalibratedCamera; 2],
+    distance_mm: f64,
+) -> Vec<[Node; 2]> {
+    let (nodes_u, nodes_v) = node_counts(pair[0], VOLUME_NODES_ALONG_LONGER_SIDE);
+    (0..nodes_u * nodes_v)
+        .filter_map(|k| {
+            let (i, j) = (k % nodes_u, k / nodes_u);
+            let pixel = node_pixel(pair[0].field.sensor, nodes_u, nodes_v, i, j);
+            see_both(indices, pair, pixel, distance_mm)
+        })
+        .collect()
+}
+
+/// A node where both cameras see the point at a distance along the first one's ray.
+fn see_both(
+    indices: [usize; 2],
+    pair: [&CalibratedCamera; 2],
+    pixel: PixelPoint,
+    distance_mm: f64,
+) -> Option<[Node; 2]> {
+    let (point_in_rig, other) = pair[0].seen_by(pair[1], pixel, distance_mm)?;
+    Some([
+        node(indices[0], pair[0], pixel, point_in_rig),
+        node(indices[1], pair[1], other, point_in_rig),
+    ])
 }
 
 /// A camera's part in a point that it sees at a pixel.

@@ -82,9 +82,7 @@ impl Fit {
 
     /// Weights from the residuals as they are, and the noise that they show.
     fn reweight(&mut self, observations: &Observations) -> Weights {
-        let numbers = 2.0 * observations.corner_count() as f64;
-        // The residuals of a fit are smaller than the noise by the parameters that it used up.
-        let freedom = (1.0 - self.effective_parameters / numbers).max(0.1);
+        let freedom = self.freedom(observations);
         let (noise, weights) = reweight(
             &self.residuals,
             observations,
@@ -97,6 +95,33 @@ impl Fit {
             ..noise
         };
         weights
+    }
+
+    /// The residuals of a fit are smaller than the noise by the parameters that it used up: mean
+    /// square of a residual over that of the noise.
+    fn freedom(&self, observations: &Observations) -> f64 {
+        let numbers = 2.0 * observations.corner_count() as f64;
+        (1.0 - self.effective_parameters / numbers).max(0.1)
+    }
+
+    /// Variance of the noise per axis, px^2, over the corners that are not rejected. With heavy
+    /// tails it is larger than the scale of the distribution.
+    pub fn pixel_variance_px2(&self, observations: &Observations) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (residuals, view) in self.residuals.iter().zip(&observations.views) {
+            for (residual, corner) in residuals.iter().zip(&view.corners) {
+                let squared = residual.map(|r| r.norm_squared() * corner.relative_weight);
+                if let Some(squared) = squared.filter(|s| self.noise.weight(*s) > 0.0) {
+                    sum += squared;
+                    count += 2.0;
+                }
+            }
+        }
+        if count > 0.0 {
+            sum / count / self.freedom(observations)
+        } else {
+            self.noise.variance_px2
+        }
     }
 
     fn priors(&self) -> Priors {

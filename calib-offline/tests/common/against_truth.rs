@@ -163,9 +163,13 @@ pub struct Coverage {
     pub within_68: f64,
     /// The same of 95 %.
     pub within_95: f64,
-    /// Squared errors with exact pixels over the predicted part of the calibration, both summed.
+    /// Squared errors with exact pixels over the calibration's part of what is predicted for the
+    /// same points, their own best placement taken out of both; both summed.
     pub calibration_squared: f64,
 }
+
+/// Points whose joint covariance is compared with their errors.
+const JOINT_MATCHES: usize = 150;
 
 /// Measures matches and compares their errors with what was predicted. The uncertainty is that of
 /// shape: a rigid motion of the whole rig is taken out.
@@ -173,12 +177,11 @@ pub fn coverage(scene: &Scene, estimate: &mut Estimate, set: MatchSet) -> Covera
     let mut rig = estimate.rig(&NAMES.map(str::to_owned));
     estimate.fill_uncertainty(&mut rig).unwrap();
     let matches = scene.matches(set, MATCHES);
-    let errors = |noisy: bool| -> Vec<(Vector3<f64>, _)> {
+    let noisy: Vec<(Vector3<f64>, _)> = {
         let measured: Vec<(Vector3<f64>, Vector3<f64>, _)> = matches
             .iter()
             .filter_map(|m| {
-                let pixels = if noisy { &m.pixels } else { &m.true_pixels };
-                let pair = [(0, pixels[0]), (1, pixels[1])];
+                let pair = [(0, m.pixels[0]), (1, m.pixels[1])];
                 let point = rig.triangulate(&pair).ok()?.point_mm;
                 Some((point, m.point_in_datum, rig.pair_covariance(pair)?))
             })
@@ -190,7 +193,6 @@ pub fn coverage(scene: &Scene, estimate: &mut Estimate, set: MatchSet) -> Covera
             .map(|(point, truth, covariance)| (placement.point(&point) - truth, covariance))
             .collect()
     };
-    let noisy = errors(true);
     let share_within = |limit: f64| {
         let within = noisy.iter().filter(|(error, covariance)| {
             let inverse = covariance.total_mm2().try_inverse().unwrap();
@@ -198,12 +200,32 @@ pub fn coverage(scene: &Scene, estimate: &mut Estimate, set: MatchSet) -> Covera
         });
         within.count() as f64 / noisy.len() as f64
     };
-    let exact = errors(false);
-    let squared: f64 = exact.iter().map(|(error, _)| error.norm_squared()).sum();
-    let predicted: f64 = exact.iter().map(|(_, c)| c.calibration_mm2.trace()).sum();
+    let within = [CHI_SQUARE_68, CHI_SQUARE_95].map(share_within);
+    let (pairs, truth): (Vec<_>, Vec<_>) = matches
+        .iter()
+        .map(|m| {
+            (
+                [(0, m.true_pixels[0]), (1, m.true_pixels[1])],
+                m.point_in_datum,
+            )
+        })
+        .filter(|(pair, _)| rig.triangulate(pair).is_ok())
+        .take(JOINT_MATCHES)
+        .unzip();
+    let exact: Vec<Vector3<f64>> = pairs
+        .iter()
+        .map(|pair| rig.triangulate(pair).unwrap().point_mm)
+        .collect();
+    let placement = best_placement(&exact, &truth).unwrap();
+    let squared: f64 = exact
+        .iter()
+        .zip(&truth)
+        .map(|(point, truth)| (placement.point(point) - truth).norm_squared())
+        .sum();
+    let predicted = estimate.point_covariance(&rig, &pairs).unwrap().unwrap();
     Coverage {
-        within_68: share_within(CHI_SQUARE_68),
-        within_95: share_within(CHI_SQUARE_95),
-        calibration_squared: squared / predicted,
+        within_68: within[0],
+        within_95: within[1],
+        calibration_squared: squared / predicted.trace(),
     }
 }
