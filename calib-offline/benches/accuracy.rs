@@ -157,7 +157,7 @@ const ROWS: [Row; 26] = [
         name: "6000x4000",
         scene: |seed| {
             of(OpticsKind::Bumps, seed, |s| {
-                s.sensor = SensorSize::new(6000, 4000)
+                s.sensor = SensorSize::new(6000, 4000);
             })
         },
     },
@@ -165,7 +165,7 @@ const ROWS: [Row; 26] = [
         name: "640x480",
         scene: |seed| {
             of(OpticsKind::Paper, seed, |s| {
-                s.sensor = SensorSize::new(640, 480)
+                s.sensor = SensorSize::new(640, 480);
             })
         },
     },

@@ -91,12 +91,13 @@ impl FieldMoments {
             .collect();
         // [j1][j2][p]
         let mut along_v = vec![0.0; (degree + 1) * (degree + 1) * (highest + 1)];
-        for j1 in 0..=degree {
-            for j2 in 0..=degree {
-                let at = (j1 * (degree + 1) + j2) * (highest + 1);
-                for p in 0..=highest - j1 - j2 {
-                    along_v[at + p] = products[j1][j2].sum(&sums[starts[p]..]);
-                }
+        let of_pairs = products
+            .iter()
+            .flatten()
+            .zip(along_v.chunks_exact_mut(highest + 1));
+        for (product, target) in of_pairs {
+            for (sum, start) in target[..=highest - product.highest].iter_mut().zip(&starts) {
+                *sum = product.sum(&sums[*start..]);
             }
         }
         let own: Vec<(usize, usize)> = terms(degree).take(components.terms(a)).collect();
@@ -114,6 +115,7 @@ impl FieldMoments {
 /// `P_m P_n` as a sum of Legendre polynomials: every second one up to `m + n`.
 struct AxisProduct {
     lowest: usize,
+    highest: usize,
     coefficients: Vec<f64>,
 }
 
@@ -136,6 +138,7 @@ fn products(degree: usize) -> Vec<Vec<AxisProduct>> {
     }
     let product = |m: usize, n: usize| AxisProduct {
         lowest: m.abs_diff(n),
+        highest: m + n,
         coefficients: (0..=m.min(n))
             .rev()
             .map(|r| {

@@ -50,18 +50,19 @@ pub fn central_model(estimate: &Estimate, rig: &Rig, matches: &[Match]) -> Centr
 
 /// What offsets would have gained a rig that ended without them.
 fn offsets_gain(choices: &[Choice]) -> Option<f64> {
-    // Where there are two offers, the later stands: the earlier was against a spline.
-    let offered = choices.iter().rev().find(|choice| {
-        let of_offsets = [Alternative::Offsets, Alternative::OffsetsForSpline];
-        of_offsets.contains(&choice.tried)
-    })?;
-    if !offered.taken {
-        return offered.gain;
+    let mut offered = choices.iter().filter(|choice| {
+        use Alternative::{Offsets, OffsetsFirst, OffsetsForSpline};
+        matches!(choice.tried, Offsets | OffsetsFirst | OffsetsForSpline)
+    });
+    if !offered.clone().any(|choice| choice.taken) {
+        // Of several offers the later stands: the earlier was against a spline.
+        return offered.next_back()?.gain;
     }
-    // They were taken at first, and each was dropped later with a gain of its own.
-    let dropped = choices
-        .iter()
-        .filter(|choice| choice.taken && matches!(choice.tried, Alternative::Central { .. }));
+    // They were taken at first, and dropped later with a gain of its own.
+    let dropped = choices.iter().filter(|choice| {
+        use Alternative::{AllCentral, Central};
+        choice.taken && matches!(choice.tried, AllCentral | Central { .. })
+    });
     dropped
         .map(|choice| choice.gain)
         .sum::<Option<f64>>()

@@ -28,8 +28,11 @@ const REACH_MARGIN: f64 = 1.1;
 /// A change by that much costs as much as a residual of so many px at one pixel.
 const PRIOR_SHARE: f64 = 1.0;
 
-/// The lens that comes nearest to what was `seen` (offset from the middle of the sensor, px, and
-/// unit direction in the camera frame), and the turn of the camera frame that goes with it
+/// Offset of a pixel from the middle of the sensor, px, and the unit direction that it sees, camera
+/// frame.
+pub type SeenDirection = (Vector2<f64>, Vector3<f64>);
+
+/// The lens that comes nearest to what was seen, and the turn of the camera frame that goes with it
 /// (`new_from_old`). `None` if no step makes it better than `start`.
 ///
 /// `reach_px` is how far from the middle of the sensor the lens must hold; there its mapping has a
@@ -38,7 +41,7 @@ const PRIOR_SHARE: f64 = 1.0;
 /// Cost: 11 evaluations of the lens per direction and step, at most 20 steps.
 pub fn nearest_lens(
     start: &BaseLens,
-    seen: &[(Vector2<f64>, Vector3<f64>)],
+    seen: &[SeenDirection],
     reach_px: f64,
 ) -> Option<(BaseLens, Matrix3<f64>)> {
     if !(reach_px > 0.0) {
@@ -69,15 +72,19 @@ pub fn nearest_lens(
             _ => damping *= 100.0,
         }
     }
-    (cost < first).then(|| (fit.lens(&at), fit.turn(&at)))
+    (cost < first).then(|| (fit.lens(&at), turn(&at)))
+}
+
+/// The turn of the camera frame.
+fn turn(at: &Parameters) -> Matrix3<f64> {
+    so3::exp(&Vector3::new(at[7], at[8], at[9]))
 }
 
 struct LensFit<'a> {
     start: BaseLens,
     /// Distance of the farthest pixel from the middle of the sensor.
     reach_px: f64,
-    /// Offset from the middle of the sensor, px, and unit direction.
-    seen: &'a [(Vector2<f64>, Vector3<f64>)],
+    seen: &'a [SeenDirection],
 }
 
 impl LensFit<'_> {
@@ -99,13 +106,9 @@ impl LensFit<'_> {
         }
     }
 
-    fn turn(&self, at: &Parameters) -> Matrix3<f64> {
-        so3::exp(&Vector3::new(at[7], at[8], at[9]))
-    }
-
     /// Differences of angle, in px at the middle of the image.
     fn residuals(&self, at: &Parameters) -> Option<Vec<Vector2<f64>>> {
-        let (lens, turn) = (self.lens(at), self.turn(at));
+        let (lens, turn) = (self.lens(at), turn(at));
         self.seen
             .iter()
             .map(|(offset, direction)| {
@@ -119,7 +122,7 @@ impl LensFit<'_> {
     }
 
     fn cost(&self, at: &Parameters) -> Option<f64> {
-        let sum: f64 = self.residuals(at)?.iter().map(|r| r.norm_squared()).sum();
+        let sum: f64 = self.residuals(at)?.iter().map(Vector2::norm_squared).sum();
         let prior: f64 = (0..PARAMETERS)
             .map(|k| PRIOR_SHARE * (at[k] / PRIOR_SD[k]).powi(2))
             .sum();

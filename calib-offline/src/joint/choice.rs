@@ -5,7 +5,7 @@ use super::estimate::EstimateError;
 use super::evidence::Family;
 use super::fit::Fit;
 use super::rebase::rebase;
-use crate::adjust::{Model, Observations};
+use crate::adjust::{CameraModel, Model, Observations};
 use crate::field::spline::{Spline, SplineGrid};
 use serde::{Deserialize, Serialize};
 
@@ -51,6 +51,8 @@ pub enum Alternative {
         /// Cells along the sensor's longer side.
         cells: f64,
     },
+    /// All cameras lose their offsets.
+    AllCentral,
     /// One camera loses its offset.
     Central {
         /// Index of the camera.
@@ -225,21 +227,37 @@ impl Search<'_> {
         })
     }
 
-    /// Drops what the evidence no longer asks for: offsets camera by camera, then splines.
+    /// Drops what the evidence no longer asks for: offsets of all cameras, else camera by camera,
+    /// then splines.
     fn simplify(&mut self) {
-        let mut changed = false;
-        for camera_idx in 0..self.best.fit.model.cameras.len() {
-            if self.best.fit.model.cameras[camera_idx].offset().is_some() {
-                let tried = Alternative::Central { camera_idx };
-                // Where another camera has offsets, a tie is no reason to think this one unlike it.
-                let cameras = &self.best.fit.model.cameras;
-                let alone = cameras.iter().filter(|c| c.offset().is_some()).count() == 1;
-                let needed = if alone { -NEEDED_GAIN } else { NEEDED_GAIN };
-                changed |= self.take_if_better(tried, needed, |model| {
-                    model.cameras[camera_idx].drop_offset();
-                });
+        let with_offset: Vec<usize> = {
+            let cameras = self.best.fit.model.cameras.iter().enumerate();
+            let with_offset = cameras.filter(|(_, camera)| camera.offset().is_some());
+            with_offset.map(|(camera_idx, _)| camera_idx).collect()
+        };
+        let mut remaining = with_offset.len();
+        if remaining > 1
+            && self.take_if_better(Alternative::AllCentral, -NEEDED_GAIN, |model| {
+                model.cameras.iter_mut().for_each(CameraModel::drop_offset);
+            })
+        {
+            remaining = 0;
+        }
+        for &camera_idx in &with_offset {
+            // Beside another camera with offsets, a tie is no reason to think this one unlike it.
+            let needed = match remaining {
+                0 => break,
+                1 => -NEEDED_GAIN,
+                _ => NEEDED_GAIN,
+            };
+            let tried = Alternative::Central { camera_idx };
+            if self.take_if_better(tried, needed, |model| {
+                model.cameras[camera_idx].drop_offset();
+            }) {
+                remaining -= 1;
             }
         }
+        let changed = remaining < with_offset.len();
         if self.best.fit.model.has_spline() && changed {
             self.drop_spline();
         }

@@ -184,8 +184,8 @@ impl Smoothness {
             .iter()
             .enumerate()
             .map(|(camera_idx, camera)| {
-                let own = self.groups.iter().filter(|g| g.camera_idx == camera_idx);
-                let energy = own.filter_map(|group| group.energy.as_ref()).next();
+                let mut own = self.groups.iter().filter(|g| g.camera_idx == camera_idx);
+                let energy = own.find_map(|group| group.energy.as_ref());
                 let thin_plate = energy.map(|energy| Arc::clone(&energy.thin_plate));
                 CameraPriors::with_energy(camera, thin_plate)
             })

@@ -2,7 +2,7 @@
 
 use crate::adjust::{Model, Observations};
 use crate::field::SmoothMap;
-use crate::field::lens_fit::nearest_lens;
+use crate::field::lens_fit::{SeenDirection, nearest_lens};
 use crate::field::structured::StructuredBasis;
 use crate::field::transport;
 use crate::geometry::{PixelPoint, RigidTransform};
@@ -28,13 +28,12 @@ pub fn rebase(model: &mut Model, observations: &Observations) {
     }
 }
 
-/// Offset from the middle of the sensor, px, and direction, at some corners of all views; and the
-/// largest offset of any corner, px.
+/// Directions at some corners of all views, and the largest offset of any corner, px.
 fn seen_directions(
     model: &Model,
     observations: &Observations,
     camera_idx: usize,
-) -> (Vec<(Vector2<f64>, Vector3<f64>)>, f64) {
+) -> (Vec<SeenDirection>, f64) {
     let field = &model.cameras[camera_idx].field;
     let center = field.sensor.center();
     let pixels: Vec<PixelPoint> = observations
