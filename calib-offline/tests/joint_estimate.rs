@@ -66,12 +66,18 @@ fn outliers_and_gaps_cost_next_to_nothing() {
 
 #[test]
 fn strong_bumps_are_followed_and_ports_are_non_central() {
-    for (optics, limit) in [(OpticsKind::Bumps, 1.09), (OpticsKind::Port, 1.02)] {
+    // Five draws each come to 1.026, 1.003, 1.003 and 1.008 (BENCHMARKS.md); four standard
+    // deviations of a draw are added.
+    for (optics, limit) in [
+        (OpticsKind::Bumps, 1.046),
+        (OpticsKind::Port, 1.023),
+        (OpticsKind::Window, 1.023),
+        (OpticsKind::Fisheye, 1.028),
+    ] {
         let scene = scene(optics, |_| ());
         let (estimate, findings) = run_scene(&scene);
         let measured = measure(&scene, &estimate, true);
         assert_eq!(findings, [], "{optics:?}");
-        // METHOD 9.1: 1.055 | 1.076 on bumps (information-limited), 1.0006 | 1.0012 on the port.
         assert!(measured.ratio < limit, "{optics:?}: {measured:?}");
         let central = estimate.model.cameras.iter().all(|c| c.field.is_central());
         assert_eq!(central, optics == OpticsKind::Bumps);

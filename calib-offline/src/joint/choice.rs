@@ -22,9 +22,11 @@ const USED_UP: f64 = 0.6;
 const ROUNDS: usize = 8;
 /// A round that changes twice the log evidence by less settles the fit.
 const SETTLED: f64 = 0.5;
-/// A model is given up when it is behind its rival by more than this and so many times the change
-/// of its last round: weights that are still on their way gain tens, not more.
+/// A model is given up when it is behind its rival by more than this and what its changes may still
+/// add up to: so many times their geometric sum, and at most so many times the last one. Weights
+/// that are still on their way gain tens, not more.
 const HOPELESS_GAP: f64 = 100.0;
+const HOPELESS_SUMS: f64 = 4.0;
 const HOPELESS_CHANGES: f64 = 10.0;
 /// Twice the log evidence that a more flexible model must gain: "positive" on the scale of Kass
 /// and Raftery (1995). Ties go to the simpler model.
@@ -95,11 +97,20 @@ impl Candidate {
         observations: &Observations,
     ) -> Result<Self, EstimateError> {
         let mut evidence = f64::NEG_INFINITY;
+        let mut last_change = f64::INFINITY;
         for round in 0..2 * ROUNDS {
             let now = fit.round(observations)?;
             let change = (now - evidence).abs();
             evidence = now;
-            let hopeless = rival - now > HOPELESS_GAP + HOPELESS_CHANGES * change;
+            // Changes that shrink by a factor still add up to so many times the last one.
+            let shrink = change / last_change;
+            let to_come = if shrink < 1.0 {
+                (HOPELESS_SUMS * shrink / (1.0 - shrink)).min(HOPELESS_CHANGES)
+            } else {
+                HOPELESS_CHANGES
+            };
+            last_change = change;
+            let hopeless = rival - now > HOPELESS_GAP + to_come * change;
             // Only what wins is worth more rounds; unsettled, it would lose to itself.
             let wins = rival.is_finite() && now - rival >= NEEDED_GAIN;
             let decided = round + 1 >= ROUNDS && !wins;
@@ -193,9 +204,13 @@ impl Search<'_> {
 
     /// Offsets, from two starts: held back, so that they explain what nothing else does; and free
     /// while the polynomials are held back. Where boards stood at much the same distance, one can
-    /// stand for the other, and weights do not find from one such model to the other.
+    /// stand for the other, and weights do not find from one such model to the other. Data that
+    /// determine a spline are not of that kind.
     fn offsets(&mut self) -> bool {
         let late = self.take_if_better(Alternative::Offsets, NEEDED_GAIN, add_offsets);
+        if self.best.fit.model.has_spline() {
+            return late;
+        }
         let needed = if late { 0.0 } else { NEEDED_GAIN };
         let mut fit = self.best.fit.changed(self.observations, add_offsets);
         fit.smoothness.put_offsets_first();

@@ -141,7 +141,7 @@ fn headline(calibration: &Calibration, facts: &Facts, blob: Option<&BlobFacts>) 
             @if let Some(distance) = facts.working_distance_mm {
                 (card("Working distance", &format!("{:.0} mm", distance.median), &format!("camera to board, {:.0} to {:.0} mm", distance.least, distance.most)))
             }
-            (card("Images", &facts.views_used.to_string(), &format!("of {} poses; {} left out", facts.poses_used, facts.left_out)))
+            (card("Images", &facts.views_used.to_string(), &format!("of {} poses; left out in whole or in part: {}", facts.poses_used, facts.left_out)))
             (card("Rejected corners", &facts.corners_rejected.to_string(), &share_rejected(facts)))
             @for camera in &facts.cameras {
                 (card(

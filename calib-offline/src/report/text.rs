@@ -68,7 +68,7 @@ pub fn summary(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
     lines.push((
         "images",
         format!(
-            "{} poses, {} images used; {} left out",
+            "{} poses, {} images used; left out in whole or in part: {}",
             facts.poses_used, facts.views_used, facts.left_out
         ),
     ));
@@ -187,7 +187,7 @@ mod tests {
             "0.0113 mm from the rigid board",
             "0.0741 px",
             "200.00 mm from left to right",
-            "33 poses, 65 images used; 2 left out",
+            "33 poses, 65 images used; left out in whole or in part: 2",
             "pose 30, right: no board found",
             "differ by 0.00299 mm RMS, 0.00289 predicted: ratio 1.04, as predicted (0.5 to 1.5 by chance)",
             "non-central, 17 of 72 offset numbers used, rays 0.0820 mm RMS from one point (most 0.390",

@@ -93,12 +93,15 @@ pub fn central_model(found: &CentralModel) -> String {
         } => {
             let points = points.map_or(String::new(), |difference| {
                 format!(
-                    "would move points by {} mm RMS (most {}) and ",
+                    "move points by {} mm RMS (most {}) and ",
                     short(difference.rms_mm),
                     short(difference.max_mm)
                 )
             });
-            format!("{points}change the evidence by {}", change(-evidence_loss))
+            format!(
+                "would {points}change the evidence by {}",
+                change(-evidence_loss)
+            )
         }
         CentralModel::NoEstimate => "not known: without offsets there is no estimate".to_owned(),
     }
