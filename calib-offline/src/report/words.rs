@@ -83,7 +83,13 @@ pub fn central_model(found: &CentralModel) -> String {
         CentralModel::IsCentral { offsets_gain } => {
             let evidence = offsets_gain.map_or_else(
                 || "the data leave offsets open".to_owned(),
-                |gain| format!("offsets would change the evidence by {}", change(gain)),
+                |gain| match gain {
+                    // Such a model is given up before it settles.
+                    far if far < -100.0 => {
+                        "offsets would lower the evidence by over 100".to_owned()
+                    }
+                    near => format!("offsets would change the evidence by {}", change(near)),
+                },
             );
             format!("costs nothing, the rig is central ({evidence})")
         }
