@@ -155,19 +155,7 @@ impl Fit {
     pub fn round(&mut self, observations: &Observations) -> Result<f64, EstimateError> {
         let weights = self.reweight(observations);
         let priors = self.priors();
-        let layout = self.model.layout();
-        let equations = NormalEquations::assemble(
-            &self.model,
-            &layout,
-            observations,
-            &self.bases,
-            &weights,
-            &priors,
-        );
-        let reduced = equations.reduce(0.0).ok_or(EstimateError::Singular {
-            free: layout.global_len,
-            corner_count: observations.corner_count(),
-        })?;
+        let (layout, equations, reduced) = self.linearized(observations, &weights, &priors)?;
         let evidence = self.ln_evidence_twice(&reduced, &priors);
         let stepped = self.model.stepped(&layout, &equations.step(&reduced));
         let cost = |model: &Model, residuals: &[Vec<Option<Vector2<f64>>>]| {
@@ -193,14 +181,23 @@ impl Fit {
         observations: &Observations,
     ) -> Result<(Layout, NormalEquations, Reduced), EstimateError> {
         let weights = self.reweight(observations);
+        self.linearized(observations, &weights, &self.priors())
+    }
+
+    fn linearized(
+        &self,
+        observations: &Observations,
+        weights: &Weights,
+        priors: &Priors,
+    ) -> Result<(Layout, NormalEquations, Reduced), EstimateError> {
         let layout = self.model.layout();
         let equations = NormalEquations::assemble(
             &self.model,
             &layout,
             observations,
             &self.bases,
-            &weights,
-            &self.priors(),
+            weights,
+            priors,
         );
         let reduced = equations.reduce(0.0).ok_or(EstimateError::Singular {
             free: layout.global_len,

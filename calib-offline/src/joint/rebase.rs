@@ -11,8 +11,9 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 /// Corners of a camera that a lens is fitted to, about.
 const CORNERS: usize = 1000;
 
-/// Puts the nearest lens under each central field without spline, and frees its shift. What the
-/// polynomial held beyond it is dropped: the next adjustment finds it again.
+/// Puts the nearest lens under each field and frees its shift. What polynomial and spline of the
+/// direction held beyond it is dropped: the next adjustment finds it again. Offsets stay as they
+/// are, and their radial terms about the center of the lens that was there when they were freed.
 pub fn rebase(model: &mut Model, observations: &Observations) {
     for camera_idx in 0..model.cameras.len() {
         let (seen, reach_px) = seen_directions(model, observations, camera_idx);

@@ -188,8 +188,8 @@ fn camera_contradiction(camera: &CalibratedCamera) -> Option<&'static str> {
     if cells == Some(0) || cells != Some(coverage.covered.len()) {
         return Some("the mask of a camera has the wrong length");
     }
-    if field.base.focal_px <= 0.0 {
-        return Some("the focal length of a camera is not above zero");
+    if field.base.focal_px <= 0.0 || field.base.reach <= 0.0 {
+        return Some("the focal length of a camera, or the reach of its lens, is not above zero");
     }
     let maps = std::iter::once(&field.direction).chain(&field.offset);
     if maps.into_iter().any(|map| !map_is_whole(map)) {
