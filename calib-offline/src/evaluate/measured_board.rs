@@ -1,8 +1,8 @@
 //! A board measured with the rig: how far its triangulated corners are from where they must be.
 
 use crate::board::BoardSpec;
-use crate::geometry::{RigidTransform, so3};
-use nalgebra::{Matrix3, Vector3};
+use crate::geometry::best_placement;
+use nalgebra::Vector3;
 use std::collections::HashMap;
 
 /// Triangulated corners of one pose.
@@ -51,31 +51,10 @@ impl MeasuredBoard {
     }
 }
 
-/// The rigid transform that brings `from` nearest to `to` in the least-squares sense (Kabsch).
-///
-/// `None` for fewer than 3 points.
-pub fn best_placement(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<RigidTransform> {
-    if from.len() < 3 {
-        return None;
-    }
-    let n = from.len() as f64;
-    let from_mean = from.iter().sum::<Vector3<f64>>() / n;
-    let to_mean = to.iter().sum::<Vector3<f64>>() / n;
-    let covariance: Matrix3<f64> = from
-        .iter()
-        .zip(to)
-        .map(|(f, t)| (t - to_mean) * (f - from_mean).transpose())
-        .sum();
-    let rotation = so3::nearest_rotation(&covariance)?;
-    Some(RigidTransform::new(
-        rotation,
-        to_mean - rotation * from_mean,
-    ))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::{RigidTransform, so3};
 
     #[test]
     fn a_scaled_board_shows_its_scale_and_a_moved_one_nothing() {

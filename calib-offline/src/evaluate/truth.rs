@@ -1,6 +1,6 @@
 //! Measured points against where they truly are, beside what a perfect calibration would do.
 
-use super::measured_board::best_placement;
+use crate::geometry::best_placement;
 use nalgebra::Vector3;
 use serde::Serialize;
 

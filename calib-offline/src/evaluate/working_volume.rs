@@ -1,7 +1,7 @@
 //! Points all over the volume that a rig was calibrated in, to compare what rigs make of them.
 
-use super::measured_board::best_placement;
 use crate::field::{CoverageMask, Rig};
+use crate::geometry::best_placement;
 use crate::geometry::{PixelPoint, RigidTransform};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

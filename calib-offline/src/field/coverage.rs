@@ -1,5 +1,6 @@
 //! Which part of the sensor is calibrated: a mask of equal cells.
 
+use crate::geometry::hull::convex_hull;
 use crate::geometry::{PixelPoint, SensorSize};
 use serde::{Deserialize, Serialize};
 
@@ -90,34 +91,6 @@ impl CoverageMask {
     }
 }
 
-/// Convex hull, counterclockwise in (u, v) taken as a right-handed plane (Andrew's chain).
-pub fn convex_hull(mut points: Vec<PixelPoint>) -> Vec<PixelPoint> {
-    points.sort_by(|a, b| a.u.total_cmp(&b.u).then(a.v.total_cmp(&b.v)));
-    points.dedup();
-    if points.len() < 3 {
-        return points;
-    }
-    let turn = |a: PixelPoint, b: PixelPoint, c: PixelPoint| {
-        (b.u - a.u) * (c.v - a.v) - (b.v - a.v) * (c.u - a.u)
-    };
-    let chain = |points: &mut dyn Iterator<Item = PixelPoint>| {
-        let mut hull: Vec<PixelPoint> = Vec::new();
-        for p in points {
-            while let [.., a, b] = hull[..]
-                && turn(a, b, p) <= 0.0
-            {
-                hull.pop();
-            }
-            hull.push(p);
-        }
-        hull.pop();
-        hull
-    };
-    let mut hull = chain(&mut points.iter().copied());
-    hull.extend(chain(&mut points.iter().rev().copied()));
-    hull
-}
-
 /// Separating-axis test between an axis-aligned rectangle `[u0, v0, u1, v1]` and a convex polygon.
 fn rectangle_touches_hull([u0, v0, u1, v1]: [f64; 4], hull: &[PixelPoint]) -> bool {
     if hull.is_empty()
@@ -140,21 +113,6 @@ fn rectangle_touches_hull([u0, v0, u1, v1]: [f64; 4], hull: &[PixelPoint]) -> bo
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn hull_of_a_square_with_inner_points_is_the_square() {
-        let mut points = vec![];
-        for u in 0..5 {
-            for v in 0..5 {
-                points.push(PixelPoint::new(f64::from(u), f64::from(v)));
-            }
-        }
-        let hull = convex_hull(points);
-        assert_eq!(
-            hull,
-            [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)].map(|(u, v)| PixelPoint::new(u, v))
-        );
-    }
 
     #[test]
     fn everything_inside_the_hull_is_answered_and_far_outside_is_not() {

@@ -3,13 +3,16 @@
 //! Lengths are millimeters, angles radians. `a_from_b` maps coordinates in frame b to coordinates
 //! in frame a, so products chain by eye: `left_from_datum * datum_from_board`.
 
+pub mod hull;
 pub mod pixel;
+pub mod placement;
 pub mod ray;
 pub mod se3;
 pub mod so3;
 pub mod triangulation;
 
 pub use pixel::{PixelPoint, SensorSize};
+pub use placement::best_placement;
 pub use ray::Ray;
 pub use se3::RigidTransform;
 pub use triangulation::{

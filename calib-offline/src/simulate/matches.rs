@@ -4,6 +4,7 @@ use super::preset;
 use super::random::{self, Purpose};
 use super::scene::Scene;
 use super::stage;
+use crate::geometry::hull::{convex_hull, hull_contains};
 use crate::geometry::{PixelPoint, RigidTransform, triangulate_rays};
 use nalgebra::Vector3;
 
@@ -47,7 +48,7 @@ impl Scene {
             pixels
                 .iter()
                 .zip(&outlines)
-                .all(|(pixel, views)| views.iter().any(|outline| contains(outline, *pixel)))
+                .all(|(pixel, views)| views.iter().any(|outline| hull_contains(outline, *pixel)))
         };
         let candidates: Box<dyn Iterator<Item = Candidate>> = match set {
             MatchSet::Points => Box::new(self.volume_points(50 * count + 1000)),
@@ -218,37 +219,4 @@ struct Candidate {
     /// The board it lies on, if it is printed on one: then the face must be seen.
     board: Option<(RigidTransform, Vector3<f64>)>,
     label: Option<(usize, usize, usize)>,
-}
-
-/// Convex hull, counter-clockwise in (u, v) (monotone chain); fewer than 3 points give no area.
-pub(super) fn convex_hull(mut points: Vec<PixelPoint>) -> Vec<PixelPoint> {
-    points.sort_by(|a, b| a.u.total_cmp(&b.u).then(a.v.total_cmp(&b.v)));
-    let half = |points: &mut dyn Iterator<Item = PixelPoint>| {
-        let mut chain: Vec<PixelPoint> = Vec::new();
-        for point in points {
-            while let [.., a, b] = chain[..] {
-                if turn(a, b, point) > 0.0 {
-                    break;
-                }
-                chain.pop();
-            }
-            chain.push(point);
-        }
-        chain.pop();
-        chain
-    };
-    let mut hull = half(&mut points.iter().copied());
-    hull.extend(half(&mut points.iter().rev().copied()));
-    hull
-}
-
-/// Twice the signed area of a triangle.
-fn turn(a: PixelPoint, b: PixelPoint, c: PixelPoint) -> f64 {
-    (b.u - a.u) * (c.v - a.v) - (b.v - a.v) * (c.u - a.u)
-}
-
-/// Whether a hull of [`convex_hull`] contains a point.
-pub(super) fn contains(hull: &[PixelPoint], point: PixelPoint) -> bool {
-    hull.len() >= 3
-        && (0..hull.len()).all(|i| turn(hull[i], hull[(i + 1) % hull.len()], point) >= 0.0)
 }

@@ -1,12 +1,12 @@
 //! A stereo rig before a chessboard on a rotation stage, and what its cameras record.
 
-use super::matches::{contains, convex_hull};
 use super::optics::CameraOptics;
 use super::pattern::Pattern;
 use super::preset::{self, RigPreset};
 use super::render::{PlateView, RenderSettings, Rendered};
 use super::settings::{SceneError, SceneSettings};
 use super::stage::{self, Placement, Wobble};
+use crate::geometry::hull::{convex_hull, hull_contains};
 use crate::geometry::{PixelPoint, Ray, RigidTransform, so3};
 use nalgebra::Vector3;
 
@@ -215,7 +215,7 @@ impl Scene {
             );
             if camera.ray(pixel).is_some() {
                 in_image += 1;
-                in_hull += i32::from(contains(&hull, pixel));
+                in_hull += i32::from(hull_contains(&hull, pixel));
             }
         }
         f64::from(in_hull) / f64::from(in_image.max(1))

@@ -314,26 +314,6 @@ fn senseless_settings_are_named() {
 }
 
 #[test]
-fn hulls_contain_their_inside_and_nothing_else() {
-    let square: Vec<_> = [
-        (0.0, 0.0),
-        (4.0, 0.0),
-        (4.0, 4.0),
-        (0.0, 4.0),
-        (2.0, 2.0),
-        (4.0, 2.0),
-    ]
-    .iter()
-    .map(|(u, v)| PixelPoint::new(*u, *v))
-    .collect();
-    let hull = matches::convex_hull(square);
-    assert_eq!(hull.len(), 4);
-    assert!(matches::contains(&hull, PixelPoint::new(1.0, 3.9)));
-    assert!(!matches::contains(&hull, PixelPoint::new(4.1, 2.0)));
-    assert!(!matches::contains(&[], PixelPoint::new(0.0, 0.0)));
-}
-
-#[test]
 fn correlated_and_heavy_tailed_noise_keep_their_size() {
     let plain = SceneSettings::standard_noisy(OpticsKind::Brown, 8);
     let observe = |settings: SceneSettings| {

@@ -3,8 +3,8 @@
 use calib_offline::adjust::Observations;
 use calib_offline::board::BoardSpec;
 use calib_offline::dataset::View;
-use calib_offline::evaluate::measured_board::best_placement;
 use calib_offline::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
+use calib_offline::geometry::best_placement;
 use calib_offline::geometry::{RigidTransform, so3};
 use calib_offline::init::rig::start_rig;
 use calib_offline::init::screening::{Finding, FindingKind};
