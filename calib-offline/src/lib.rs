@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 pub mod adjust;
+pub mod alternating;
 pub mod atomic_file;
 pub mod board;
 pub mod cli;

@@ -123,6 +123,25 @@ pub fn geodesic_median(rotations: &[Matrix3<f64>]) -> Option<Matrix3<f64>> {
     nearest_rotation(&mean)
 }
 
+/// Geodesic L2 mean (Karcher mean) of rotations: the one from which the logarithms to all sum to zero
+/// (Hartley et al. 2013; paper Eqs. 31 and 32). Unique for rotations less than 90 degrees from it.
+/// `None` if there is none.
+pub fn karcher_mean(rotations: &[Matrix3<f64>]) -> Option<Matrix3<f64>> {
+    let mut mean = *rotations.first()?;
+    for _ in 0..100 {
+        let step = rotations
+            .iter()
+            .map(|rotation| log(&mean.tr_mul(rotation)))
+            .sum::<Vector3<f64>>()
+            / rotations.len() as f64;
+        mean *= exp(&step);
+        if step.norm() < 1e-14 {
+            break;
+        }
+    }
+    nearest_rotation(&mean)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -166,5 +185,26 @@ mod tests {
         rotations.push(exp(&Vector3::new(0.0, 0.0, 3.0)));
         let median = geodesic_median(&rotations).unwrap();
         assert!(angle_rad(&(median.transpose() * truth)) < 1e-9);
+    }
+
+    #[test]
+    fn mean_about_one_axis_is_that_of_the_angles() {
+        let axis = Vector3::new(0.3, -0.8, 0.52).normalize();
+        let about = |angle: f64| exp(&(axis * angle));
+        let mean = karcher_mean(&[about(0.1), about(-0.4), about(0.9)]).unwrap();
+        assert!((log(&mean) - axis * 0.2).norm() < 1e-14);
+        let half = karcher_mean(&[about(0.1), about(0.7)]).unwrap();
+        assert!((log(&half) - axis * 0.4).norm() < 1e-14);
+        assert_eq!(karcher_mean(&[]), None);
+    }
+
+    #[test]
+    fn mean_of_rotations_about_all_axes_is_the_one_they_surround() {
+        let middle = exp(&Vector3::new(0.4, 0.2, -0.7));
+        let around: Vec<Matrix3<f64>> = (0..3)
+            .flat_map(|k| [0.5, -0.5].map(|a| middle * exp(&(Vector3::ith(k, 1.0) * a))))
+            .collect();
+        let mean = karcher_mean(&around).unwrap();
+        assert!((mean - middle).norm() < 1e-14);
     }
 }

@@ -3,7 +3,7 @@
 use super::output::oracle_rms_mm;
 use super::*;
 use crate::dataset::{Corner, View};
-use crate::geometry::{PixelPoint, SensorSize, so3, triangulate_rays};
+use crate::geometry::{SensorSize, so3, triangulate_rays};
 
 fn scene(settings: SceneSettings) -> Scene {
     Scene::new(settings).unwrap()
