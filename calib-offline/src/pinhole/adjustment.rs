@@ -10,11 +10,9 @@ use crate::adjust::robust::{StudentT, reweight};
 use crate::adjust::{Observations, StopReason};
 use crate::geometry::so3::skew;
 use crate::geometry::{PixelPoint, RigidTransform};
-use nalgebra::{SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{DMatrix, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Parameters of a camera: intrinsics, then its place.
-const PER_CAMERA: usize = INTRINSICS + 6;
 /// Damping of the first step, the least there is, and the most before giving up.
 const FIRST_DAMPING: f64 = 1e-3;
 const LEAST_DAMPING: f64 = 1e-14;
@@ -322,60 +320,76 @@ fn assemble(
         }
     }
     for (idx, view, first_from_board) in taking_part(state, observations) {
-        let camera = &state.cameras[view.camera_idx];
-        let camera_from_first = &state.camera_from_first[view.camera_idx];
-        let mut normal = SMatrix::<f64, PER_CAMERA, PER_CAMERA>::zeros();
-        let mut gradient = SVector::<f64, PER_CAMERA>::zeros();
-        let mut cross = SMatrix::<f64, PER_CAMERA, 6>::zeros();
+        let columns = columns(free, view.camera_idx);
+        let products = products(state, view, &first_from_board, &weights[idx], &columns);
+        let (shared, last) = (columns.len(), columns.len() + 6);
         let block = &mut equations.poses[view.pose_idx];
-        for (corner, weight) in view.corners.iter().zip(&weights[idx]) {
-            let turned = first_from_board.rotation * corner.point_in_board;
-            let point_in_first = turned + first_from_board.translation_mm;
-            let carried = camera_from_first.rotation * point_in_first;
-            let point_in_camera = carried + camera_from_first.translation_mm;
-            let Some(seen) = camera.linearize(&point_in_camera) else {
-                continue;
-            };
-            let residual = difference(seen.pixel, corner.pixel);
-            let mut by_camera = SMatrix::<f64, 2, PER_CAMERA>::zeros();
-            by_camera
-                .fixed_view_mut::<2, INTRINSICS>(0, 0)
-                .copy_from(&seen.by_intrinsics);
-            by_camera
-                .fixed_view_mut::<2, 3>(0, INTRINSICS)
-                .copy_from(&(-seen.by_point * skew(&carried)));
-            by_camera
-                .fixed_view_mut::<2, 3>(0, INTRINSICS + 3)
-                .copy_from(&seen.by_point);
-            let by_first = seen.by_point * camera_from_first.rotation;
-            let mut by_pose = SMatrix::<f64, 2, 6>::zeros();
-            by_pose
-                .fixed_view_mut::<2, 3>(0, 0)
-                .copy_from(&(-by_first * skew(&turned)));
-            by_pose.fixed_view_mut::<2, 3>(0, 3).copy_from(&by_first);
-            let weighted = by_camera * *weight;
-            normal += weighted.tr_mul(&by_camera);
-            gradient += weighted.tr_mul(&residual);
-            cross += weighted.tr_mul(&by_pose);
-            block.own += by_pose.tr_mul(&by_pose) * *weight;
-            block.gradient += by_pose.tr_mul(&residual) * *weight;
-        }
+        block.own += products.fixed_view::<6, 6>(shared, shared);
+        block.gradient += products.fixed_view::<6, 1>(shared, last);
         if block.own.trace() == 0.0 {
             // All of its corners were rejected.
             block.own.fill_with_identity();
         }
-        let columns = columns(free, view.camera_idx);
-        for (own, at) in &columns {
-            equations.shared_gradient[*at] += gradient[*own];
-            for (other, other_at) in &columns {
-                equations.shared[(*at, *other_at)] += normal[(*own, *other)];
+        for (row, (_, at)) in columns.iter().enumerate() {
+            equations.shared_gradient[*at] += products[(row, last)];
+            for (col, (_, other_at)) in columns.iter().enumerate() {
+                equations.shared[(*at, *other_at)] += products[(row, col)];
             }
             for k in 0..6 {
-                block.cross[(*at, k)] += cross[(*own, k)];
+                block.cross[(*at, k)] += products[(row, shared + k)];
             }
         }
     }
     equations
+}
+
+/// Weighted products of the columns of a view's Jacobian with each other and with the residuals:
+/// those of its camera, six of its pose, the residuals last.
+fn products(
+    state: &State,
+    view: &ViewBlock,
+    first_from_board: &RigidTransform,
+    weights: &[f64],
+    columns: &[(usize, usize)],
+) -> DMatrix<f64> {
+    let camera = &state.cameras[view.camera_idx];
+    let camera_from_first = &state.camera_from_first[view.camera_idx];
+    let shared = columns.len();
+    // One column per number observed, so that they are filled in order.
+    let mut transposed = DMatrix::zeros(shared + 7, 2 * view.corners.len());
+    for (k, (corner, weight)) in view.corners.iter().zip(weights).enumerate() {
+        let turned = first_from_board.rotation * corner.point_in_board;
+        let point_in_first = turned + first_from_board.translation_mm;
+        let carried = camera_from_first.rotation * point_in_first;
+        let seen = camera.linearize(&(carried + camera_from_first.translation_mm));
+        // What is behind the camera counts nothing, or the state had no finite cost.
+        let Some(seen) = seen.filter(|_| *weight > 0.0) else {
+            continue;
+        };
+        let residual = difference(seen.pixel, corner.pixel);
+        let by_turn = -seen.by_point * skew(&carried);
+        let by_first = seen.by_point * camera_from_first.rotation;
+        let by_first_turn = -by_first * skew(&turned);
+        let root = weight.sqrt();
+        for axis in 0..2 {
+            let mut column = transposed.column_mut(2 * k + axis);
+            for (row, (own, _)) in columns.iter().enumerate() {
+                column[row] = root
+                    * match own.checked_sub(INTRINSICS) {
+                        None => seen.by_intrinsics[(axis, *own)],
+                        Some(place @ 0..3) => by_turn[(axis, place)],
+                        Some(place) => seen.by_point[(axis, place - 3)],
+                    };
+            }
+            for place in 0..3 {
+                column[shared + place] = root * by_first_turn[(axis, place)];
+                column[shared + 3 + place] = root * by_first[(axis, place)];
+            }
+            column[shared + 6] = root * residual[axis];
+        }
+    }
+    let jacobian = transposed.transpose();
+    transposed * jacobian
 }
 
 fn stepped(state: &State, free: Free, step: &Step) -> State {

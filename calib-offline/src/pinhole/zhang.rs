@@ -4,12 +4,16 @@
 //! `h1^T B h2 = 0` and `(h1 + h2)^T B (h1 - h2) = 0` with the conic `B = K^-T K^-1`: two linear
 //! equations per view. Lens distortion is not part of it; what it gives is a starting point.
 //!
-//! What determines how much, for a board that
-//! * moves without turning, or turns about its own normal only: nothing beyond what one view gives;
-//! * turns about one axis parallel to itself, as on a stage: everything in theory from three angles
-//!   on, since the circular points of its planes wander along the absolute conic and five points
-//!   fix a conic. But noise is amplified far more than with tilts both ways (a test below has the
-//!   figure), and so is whatever a distortion-free model lacks.
+//! What it determines, and how well:
+//! * A board that moves without turning, or turns about its own normal only, tells nothing beyond
+//!   its first view: two equations, or for a board that faces the camera none.
+//! * A board that turns about one axis parallel to itself, as on a stage, determines everything from
+//!   three angles on: the circular points of its planes wander along the absolute conic, and five
+//!   points fix a conic. METHOD section 3 calls this motion nearly critical; for this closed form it
+//!   is not. From -40 to 40 degrees it amplifies noise by 1.1 to 1.2 against tilts both ways of the
+//!   same size, and only tilts within 4 degrees make that 1.7 (a test below).
+//! * What does harm is small tilts of either kind (noise grows with the inverse square), and
+//!   distortion, which the closed form takes for perspective.
 
 use super::homography::{PixelHomography, camera_matrix};
 use crate::geometry::{PixelPoint, SensorSize};
@@ -234,44 +238,49 @@ mod tests {
         }
     }
 
-    fn scatter_px(turns_rad: &[[f64; 3]], form: ZhangForm) -> ([f64; 4], usize) {
+    /// RMS error of the focal lengths over noise draws of 0.1 px, px.
+    fn focal_error_px(turns_rad: &[[f64; 3]], share: f64, form: ZhangForm) -> f64 {
+        const DRAWS: usize = 40;
         let k = truth(SENSOR.center());
+        let turns: Vec<_> = turns_rad
+            .iter()
+            .map(|turn| turn.map(|x| x * share))
+            .collect();
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
-        let mut sums = [0.0; 4];
-        let mut count = 0;
-        for _ in 0..40 {
-            let noisy = homographies(&k, turns_rad, || {
+        let mut squared = 0.0;
+        for _ in 0..DRAWS {
+            let noisy = homographies(&k, &turns, || {
                 let x: f64 = StandardNormal.sample(&mut rng);
                 0.1 * x
             });
-            if let Some(found) = zhang(&noisy, SENSOR, form) {
-                let d = found.matrix() - k;
-                for (sum, d) in sums
-                    .iter_mut()
-                    .zip([d[(0, 0)], d[(1, 1)], d[(0, 2)], d[(1, 2)]])
-                {
-                    *sum += d * d;
-                }
-                count += 1;
-            }
+            let found = zhang(&noisy, SENSOR, form).unwrap().focal_px;
+            squared += (found[0] - k[(0, 0)]).powi(2) + (found[1] - k[(1, 1)]).powi(2);
         }
-        (sums.map(|s| (s / f64::from(count)).sqrt()), count as usize)
+        (squared / (2 * DRAWS) as f64).sqrt()
     }
 
     #[test]
-    fn one_axis_amplifies_noise() {
+    fn one_axis_is_nearly_as_good_as_two_and_small_tilts_are_bad() {
         for form in [ZhangForm::Conic, ZhangForm::FixedCenter] {
-            for share in [1.0, 0.5, 0.25, 0.1] {
-                let scale = |turns: Vec<[f64; 3]>| -> Vec<[f64; 3]> {
-                    turns.iter().map(|t| t.map(|x| x * share)).collect()
-                };
-                eprintln!(
-                    "{form:?} {share} general {:.2?} single {:.2?}",
-                    scatter_px(&scale(general()), form),
-                    scatter_px(&scale(single_axis()), form)
-                );
-            }
+            let loss = |share: f64| {
+                focal_error_px(&single_axis(), share, form)
+                    / focal_error_px(&general(), share, form)
+            };
+            // 1.1 and 1.7 here; a ratio of two such errors, of 40 draws each, is known to 16 %.
+            let (wide, narrow) = (loss(1.0), loss(0.1));
+            assert!((0.7..1.6).contains(&wide), "{form:?} {wide}");
+            assert!((1.0..2.5).contains(&narrow), "{form:?} {narrow}");
+            let [wide_px, narrow_px] =
+                [1.0, 0.1].map(|share| focal_error_px(&single_axis(), share, form));
+            assert!(narrow_px > 20.0 * wide_px, "{form:?} {wide_px} {narrow_px}");
         }
+    }
+
+    #[test]
+    fn two_angles_of_one_axis_leave_the_conic_open() {
+        let k = truth(PixelPoint::new(655.0, 490.0));
+        let two = homographies(&k, &[[0.0, -0.5, 0.0], [0.0, 0.4, 0.0]], || 0.0);
+        assert!(zhang(&two, SENSOR, ZhangForm::Conic).is_none());
     }
 
     #[test]
