@@ -7,9 +7,9 @@
 
 use calib_offline::adjust::Observations;
 use calib_offline::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
-use calib_offline::pinhole::adjustment::{Free, State, minimize};
 use calib_offline::geometry::RigidTransform;
 use calib_offline::pinhole::BrownCamera;
+use calib_offline::pinhole::adjustment::{Free, State, minimize};
 use calib_offline::pinhole::{
     Loss, PinholeRig, Refine, RigSettings, Settings, StartKind, calibrate_rig, stereo,
 };
@@ -94,14 +94,23 @@ fn draw(optics: OpticsKind, seed: u64) -> Result<Drawn> {
         let own = observations.of_camera(0);
         let start = calib_offline::init::focal_scan::start_camera(&own, 0)?;
         let state = State {
-            cameras: vec![BrownCamera::ideal(own.sensors[0], [start.field.base.focal_px; 2], own.sensors[0].center())],
+            cameras: vec![BrownCamera::ideal(
+                own.sensors[0],
+                [start.field.base.focal_px; 2],
+                own.sensors[0].center(),
+            )],
             camera_from_first: vec![RigidTransform::identity()],
             first_from_board: start.camera_from_board,
         };
         let begun = Instant::now();
         let o = minimize(state, &own, Free::Intrinsics, &Settings::default())?;
         fit_seconds = fit_seconds.min(begun.elapsed().as_secs_f64());
-        println!("{} {} {fit_seconds} s, {} iterations", optics.name(), own.corner_count(), o.iterations);
+        println!(
+            "{} {} {fit_seconds} s, {} iterations",
+            optics.name(),
+            own.corner_count(),
+            o.iterations
+        );
     }
     let started = Instant::now();
     let everything = calibrate_rig(&observations, &RigSettings::default())?;

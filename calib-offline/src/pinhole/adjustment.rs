@@ -94,9 +94,18 @@ pub struct Outcome {
     pub iterations: usize,
     /// Why it ended.
     pub stop: StopReason,
-    /// Standard deviations of what was free, camera by camera (intrinsics, then rotation in rad and
-    /// translation in mm), from the residuals' own variance. `None` if the data leave something open.
-    pub standard_deviations: Option<Vec<f64>>,
+    /// Per camera, from the residuals' own variance. `None` if the data leave something open.
+    pub deviations: Option<Vec<CameraDeviations>>,
+}
+
+/// Standard deviations of a camera's numbers; 0 for what was held.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct CameraDeviations {
+    /// Of `fx, fy, cx, cy, k1, k2, p1, p2, k3`.
+    pub intrinsics: [f64; INTRINSICS],
+    /// Of its place in the first camera's frame, by the perturbation of
+    /// [`RigidTransform::perturbed`]: rotation in rad, translation in mm.
+    pub place: [f64; 6],
 }
 
 /// Moves what is free from a state to the nearest minimum.
@@ -454,13 +463,23 @@ fn summarize(
     }
     let pose_count = state.first_from_board.iter().flatten().count();
     let unknowns = shared_count(free, state.cameras.len()) + 6 * pose_count;
-    let standard_deviations = (2 * count > unknowns)
+    let deviations = (2 * count > unknowns)
         .then(|| assemble(&state, observations, weights, free).shared_covariance())
         .flatten()
         .map(|covariance| {
             let variance = weighted / (2 * count - unknowns) as f64;
-            let deviation = |v: &f64| (v * variance).sqrt();
-            covariance.diagonal().iter().map(deviation).collect()
+            let camera_deviations = |camera_idx: usize| {
+                let mut deviations = CameraDeviations::default();
+                for (own, at) in columns(free, camera_idx) {
+                    let deviation = (variance * covariance[(at, at)]).sqrt();
+                    match own.checked_sub(INTRINSICS) {
+                        None => deviations.intrinsics[own] = deviation,
+                        Some(place) => deviations.place[place] = deviation,
+                    }
+                }
+                deviations
+            };
+            (0..state.cameras.len()).map(camera_deviations).collect()
         });
     Outcome {
         misfit: cost_px2,
@@ -469,7 +488,7 @@ fn summarize(
         corner_count: count,
         iterations: run.iterations,
         stop: run.stop,
-        standard_deviations,
+        deviations,
         state,
     }
 }

@@ -221,7 +221,7 @@ fn fit_of(
         iterations: outcome.iterations,
         stop: outcome.stop,
         standard_deviations: outcome
-            .standard_deviations
-            .and_then(|deviations| deviations.try_into().ok()),
+            .deviations
+            .and_then(|cameras| Some(cameras.first()?.intrinsics)),
     }
 }

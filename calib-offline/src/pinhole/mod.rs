@@ -18,7 +18,7 @@ pub mod stereo;
 mod tests;
 pub mod zhang;
 
-pub use adjustment::{Loss, Settings};
+pub use adjustment::{CameraDeviations, Loss, Settings};
 pub use brown::BrownCamera;
 pub use calibrate_camera::{CameraFit, StartKind, StartTried, calibrate_camera};
 pub use homography::PixelHomography;

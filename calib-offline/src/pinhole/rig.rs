@@ -1,5 +1,6 @@
 //! The baseline's result: Brown cameras, where they stand, and what they measure.
 
+use super::adjustment::CameraDeviations;
 use super::brown::BrownCamera;
 use super::calibrate_camera::CameraFit;
 use crate::adjust::StopReason;
@@ -27,6 +28,9 @@ pub struct PinholeRig {
     pub iterations: usize,
     /// Why it ended.
     pub stop: StopReason,
+    /// Per camera, from the residuals' own variance: 0 for what was held, `None` if the data leave
+    /// something open.
+    pub deviations: Option<Vec<CameraDeviations>>,
 }
 
 impl PinholeRig {

@@ -87,6 +87,7 @@ pub fn join(
         corner_count: outcome.corner_count,
         iterations: outcome.iterations,
         stop: outcome.stop,
+        deviations: outcome.deviations,
     })
 }
 
