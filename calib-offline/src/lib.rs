@@ -16,6 +16,7 @@ pub mod init;
 pub mod joint;
 pub mod matches;
 pub mod pack;
+pub mod pinhole;
 pub mod pipeline;
 pub mod progress;
 pub mod report;

@@ -10,7 +10,7 @@ const LAYERS: [&[&str]; 10] = [
     &["detect", "simulate", "field"],
     &["adjust"],
     &["init"],
-    &["joint"],
+    &["joint", "pinhole"],
     &["evaluate", "matches", "pack", "report"],
     &["error"],
     &["pipeline", "demo"],

@@ -31,60 +31,113 @@ fn centroid_and_spread(points: &[Vector3<f64>]) -> Option<(Vector3<f64>, f64, f6
     (scale > 0.0).then(|| (centroid, scale, (mean - half).max(0.0).sqrt()))
 }
 
+/// How a flat board appears to a camera: `H (X, Y, 1)^T` is along the bearing of the board's point
+/// (X, Y), and points to it, not away from it. One common factor is open.
+#[derive(Debug, Clone, Copy)]
+pub struct BoardHomography {
+    /// Of `((X, Y) - centroid) / scale` instead of (X, Y): so the equations are well conditioned.
+    columns: Matrix3<f64>,
+    centroid_in_board: Vector3<f64>,
+    scale_mm: f64,
+}
+
+impl BoardHomography {
+    /// Direct linear transform: `d x (H (X, Y, 1)^T) = 0` for each corner, d being its bearing of
+    /// any length; the smallest eigenvector of the 9 x 9 normal matrix.
+    ///
+    /// `None` if the corners lie on a line.
+    pub fn fit(bearings: &[Vector3<f64>], points_in_board: &[Vector3<f64>]) -> Option<Self> {
+        let (centroid, scale, spread) = centroid_and_spread(points_in_board)?;
+        if spread <= MIN_FLATNESS * scale {
+            return None;
+        }
+        let mut normal = SMatrix::<f64, 9, 9>::zeros();
+        for (bearing, point) in bearings.iter().zip(points_in_board) {
+            let d = bearing.normalize();
+            let p = (point - centroid) / scale;
+            let x = Vector3::new(p.x, p.y, 1.0);
+            // d x (H x): row i of [d] times H x, with H column by column in the unknown.
+            let cross = so3::skew(&d);
+            for row in 0..3 {
+                let equation = SVector::<f64, 9>::from_fn(|k, _| cross[(row, k % 3)] * x[k / 3]);
+                normal += equation * equation.transpose();
+            }
+        }
+        let eigen = normal.symmetric_eigen();
+        let smallest = eigen.eigenvalues.imin();
+        let mut h = Matrix3::from_column_slice(eigen.eigenvectors.column(smallest).as_slice());
+        let in_front: f64 = bearings
+            .iter()
+            .zip(points_in_board)
+            .map(|(bearing, point)| {
+                let p = (point - centroid) / scale;
+                bearing.dot(&(h * Vector3::new(p.x, p.y, 1.0))).signum()
+            })
+            .sum();
+        if in_front < 0.0 {
+            h = -h;
+        }
+        Some(Self {
+            columns: h,
+            centroid_in_board: centroid,
+            scale_mm: scale,
+        })
+    }
+
+    /// The same with every bearing mapped by a matrix, as by a camera matrix or its inverse.
+    pub fn then(&self, map: &Matrix3<f64>) -> Self {
+        Self {
+            columns: map * self.columns,
+            ..*self
+        }
+    }
+
+    /// H itself, for points (X, Y, 1) of the board in mm.
+    pub fn matrix(&self) -> Matrix3<f64> {
+        let centroid = &self.centroid_in_board;
+        let (h1, h2) = (
+            self.columns.column(0) / self.scale_mm,
+            self.columns.column(1) / self.scale_mm,
+        );
+        let h3 = self.columns.column(2) - h1 * centroid.x - h2 * centroid.y;
+        Matrix3::from_columns(&[h1, h2, h3])
+    }
+
+    /// `camera_from_board`: the nearest orthonormal pair to the first two columns, and the third by
+    /// the mean of their lengths (METHOD (5), where the length is that of the first alone).
+    ///
+    /// `None` if the homography is degenerate.
+    pub fn pose(&self) -> Option<RigidTransform> {
+        let h = &self.columns;
+        // Columns of H are r1, r2 (times scale) and t at the centroid, all by one factor.
+        let length = f64::midpoint(h.column(0).norm(), h.column(1).norm());
+        if !(length > 0.0) {
+            return None;
+        }
+        let (h1, h2) = (h.column(0).into_owned(), h.column(1).into_owned());
+        let rotation = so3::nearest_rotation(&Matrix3::from_columns(&[
+            h1 / length,
+            h2 / length,
+            h1.cross(&h2) / (length * length),
+        ]))?;
+        let translation_of_centroid = h.column(2) * (self.scale_mm / length);
+        Some(RigidTransform::new(
+            rotation,
+            translation_of_centroid - rotation * self.centroid_in_board,
+        ))
+    }
+}
+
 /// `camera_from_board` of a flat board and the RMS angle (rad) that its corners miss their
 /// bearings by.
 ///
-/// Direct linear transform on bearings: `d x (H (X, Y, 1)^T) = 0` for each corner, the smallest
-/// eigenvector of the 9 x 9 normal matrix, the nearest orthonormal pair to its first two columns.
-/// Bearings need not be unit vectors. `None` if the corners lie on a line or the system is
-/// degenerate.
+/// From the [`BoardHomography`] of the bearings, which need not be unit vectors. `None` if the
+/// corners lie on a line or the system is degenerate.
 pub fn bearing_pose(
     bearings: &[Vector3<f64>],
     points_in_board: &[Vector3<f64>],
 ) -> Option<(RigidTransform, f64)> {
-    let (centroid, scale, spread) = centroid_and_spread(points_in_board)?;
-    if spread <= MIN_FLATNESS * scale {
-        return None;
-    }
-    let mut normal = SMatrix::<f64, 9, 9>::zeros();
-    for (bearing, point) in bearings.iter().zip(points_in_board) {
-        let d = bearing.normalize();
-        let p = (point - centroid) / scale;
-        let x = Vector3::new(p.x, p.y, 1.0);
-        // d x (H x): row i of [d] times H x, with H column by column in the unknown.
-        let cross = so3::skew(&d);
-        for row in 0..3 {
-            let equation = SVector::<f64, 9>::from_fn(|k, _| cross[(row, k % 3)] * x[k / 3]);
-            normal += equation * equation.transpose();
-        }
-    }
-    let eigen = normal.symmetric_eigen();
-    let smallest = eigen.eigenvalues.imin();
-    let mut h = Matrix3::from_column_slice(eigen.eigenvectors.column(smallest).as_slice());
-    let in_front: f64 = bearings
-        .iter()
-        .zip(points_in_board)
-        .map(|(bearing, point)| {
-            let p = (point - centroid) / scale;
-            bearing.dot(&(h * Vector3::new(p.x, p.y, 1.0))).signum()
-        })
-        .sum();
-    if in_front < 0.0 {
-        h = -h;
-    }
-    // Columns of H are r1, r2 (times scale) and t at the centroid, all by one factor.
-    let length = f64::midpoint(h.column(0).norm(), h.column(1).norm());
-    if !(length > 0.0) {
-        return None;
-    }
-    let (h1, h2) = (h.column(0).into_owned(), h.column(1).into_owned());
-    let rotation = so3::nearest_rotation(&Matrix3::from_columns(&[
-        h1 / length,
-        h2 / length,
-        h1.cross(&h2) / (length * length),
-    ]))?;
-    let translation_of_centroid = h.column(2) * (scale / length);
-    let pose = RigidTransform::new(rotation, translation_of_centroid - rotation * centroid);
+    let pose = BoardHomography::fit(bearings, points_in_board)?.pose()?;
     let squared: f64 = bearings
         .iter()
         .zip(points_in_board)

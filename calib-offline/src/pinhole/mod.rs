@@ -1,0 +1,70 @@
+//! The baseline: a pinhole with Brown-Conrady distortion per camera, calibrated from Zhang's closed
+//! form, and the places of the cameras to each other; what the publication compares with, and what
+//! OpenCV's `calibrateCamera` and `stereoCalibrate` compute from the same corners.
+//!
+//! [`calibrate_camera`] takes one camera at a time: homographies ([`homography`]), focal lengths in
+//! closed form ([`zhang()`]), then all numbers and poses together ([`adjustment`]). It starts from the
+//! project's own initialization too and keeps the lower minimum. [`calibrate_rig`] joins the cameras
+//! over their common poses.
+
+pub mod adjustment;
+mod arrowhead;
+pub mod brown;
+pub mod calibrate_camera;
+pub mod homography;
+pub mod rig;
+pub mod stereo;
+#[cfg(test)]
+mod tests;
+pub mod zhang;
+
+pub use adjustment::{CameraDeviations, Loss, Settings};
+pub use brown::BrownCamera;
+pub use calibrate_camera::{CameraFit, StartKind, StartTried, calibrate_camera};
+pub use homography::PixelHomography;
+pub use rig::PinholeRig;
+pub use stereo::{Refine, RigSettings, calibrate_rig};
+pub use zhang::{ZhangCamera, ZhangForm, zhang};
+
+use crate::init::InitError;
+
+/// Why there is no baseline. All but the last mean that the data cannot determine it.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PinholeError {
+    /// Too few usable views, no perspective in them, or no pose in common with other cameras.
+    #[error(transparent)]
+    Init(#[from] InitError),
+    /// No start led anywhere.
+    #[error(
+        "camera {camera_idx}: no pinhole explains its {views} usable view(s) of the board: neither \
+         Zhang's closed form nor the scan of focal lengths gives a start with all boards before \
+         the camera"
+    )]
+    NoStart {
+        /// Index of the camera.
+        camera_idx: usize,
+        /// Usable views.
+        views: usize,
+    },
+    /// An adjustment was to start with a board behind a camera.
+    #[error(
+        "camera {camera_idx} would see the board of pose {pose} behind itself: no pinhole sees \
+         more than a half space, and with cameras that stand as their common poses say, this \
+         view contradicts the others"
+    )]
+    BehindCamera {
+        /// Index of the camera.
+        camera_idx: usize,
+        /// Number of the pose.
+        pose: usize,
+    },
+    /// The observations have no such camera.
+    #[error("there is no camera {camera_idx}, there are {have}")]
+    NoSuchCamera {
+        /// Index asked for.
+        camera_idx: usize,
+        /// Number of cameras.
+        have: usize,
+    },
+}
