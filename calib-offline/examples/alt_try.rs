@@ -24,7 +24,7 @@ fn main() {
         let network = NetworkSettings { spread_px: spread, neurons, seed: 1 };
         for order in [0, 3, 4, 1, 2] {
             print!("{:8} order {order}:", kind.name());
-            for sweeps in [0, 3, 10, 30, 100] {
+            for sweeps in [0, 10, 30, 60, 100, 200, 400] {
                 let t = std::time::Instant::now();
                 let e = experiment(&start.observations, &fields, &network, sweeps, order);
                 let mut pts = vec![];

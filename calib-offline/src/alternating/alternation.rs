@@ -8,14 +8,18 @@
 //! the cost does (METHOD 1.1). [`Alternated::still_falling`] says so.
 
 use super::line_fit::fit_line;
+use super::mixing::Mixing;
 use super::pose_step::{Pull, closed_form_step, moved};
-use crate::geometry::{PixelPoint, Ray, RigidTransform};
-use nalgebra::Vector3;
+use crate::geometry::{PixelPoint, Ray, RigidTransform, so3};
+use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Fewest poses that a pixel must see to have a say about them: two points always have a line.
-pub const MIN_POSES_PER_PIXEL: usize = 3;
+/// Fewest boards that a pixel must see: two points always have a line, however wrong.
+pub const MIN_BOARDS: usize = 3;
+/// Least standard deviation of a pixel's control points along its ray, as a share of the boards'
+/// distance: points in one place determine no direction.
+pub const MIN_DEPTH_SHARE: f64 = 0.01;
 
 /// Where one pixel looks on each board.
 #[derive(Debug, Clone)]
@@ -33,6 +37,9 @@ pub struct AlternationSettings {
     pub sweeps: usize,
     /// Stop when no control point moved by more than this in a sweep, mm.
     pub step_mm: f64,
+    /// How many earlier sweeps are mixed into the next start; 0 is the publication's plain
+    /// alternation.
+    pub mixing: usize,
 }
 
 /// Why the alternation ended.
@@ -108,40 +115,121 @@ pub fn alternate(
     datum: usize,
     settings: &AlternationSettings,
 ) -> Alternated {
+    let chart = Chart::new(start, datum);
+    let mut mixing = Mixing::new(settings.mixing);
     let mut poses = start.to_vec();
-    let mut rms_mm = Vec::new();
+    let (mut feet, mut rms) = pulls(cameras, &poses);
+    let mut rms_mm = vec![rms];
     let mut stop = AlternationStop::SweepLimit;
     let mut last_step_mm = 0.0;
     for _ in 0..settings.sweeps {
-        let (pulls, rms) = pulls(cameras, &poses);
-        rms_mm.push(rms);
-        last_step_mm = 0.0;
-        for (pose_idx, pulls) in pulls.iter().enumerate() {
-            let placed = poses.get_mut(pose_idx).and_then(Option::as_mut);
-            let Some(theta) = placed.filter(|_| pose_idx != datum) else {
-                continue;
-            };
-            let Some(eps) = closed_form_step(theta, pulls) else {
-                continue;
-            };
-            let next = moved(theta, &eps);
-            last_step_mm = pulls
-                .iter()
-                .map(|pull| (next.point(&pull.board_mm) - theta.point(&pull.board_mm)).norm())
-                .fold(last_step_mm, f64::max);
-            *theta = next;
+        let (swept, step_mm) = sweep(&poses, &feet, datum);
+        last_step_mm = step_mm;
+        let mixed = if settings.mixing > 0 {
+            let next = mixing.next(&chart.numbers(&poses), &chart.numbers(&swept));
+            chart.poses(&next)
+        } else {
+            swept.clone()
+        };
+        let (mut next_feet, mut next_rms) = pulls(cameras, &mixed);
+        poses = mixed;
+        // A sweep never raises the cost; a mixture may.
+        if settings.mixing > 0 && !(next_rms <= rms) {
+            mixing.clear();
+            (next_feet, next_rms) = pulls(cameras, &swept);
+            poses = swept;
         }
-        if last_step_mm < settings.step_mm {
+        (feet, rms) = (next_feet, next_rms);
+        rms_mm.push(rms);
+        if step_mm < settings.step_mm {
             stop = AlternationStop::StepBelowLimit;
             break;
         }
     }
-    rms_mm.push(pulls(cameras, &poses).1);
     Alternated {
         poses,
         rms_mm,
         stop,
         last_step_mm,
+    }
+}
+
+/// All poses moved to the feet of their control points (26, 30), and the farthest that a control
+/// point moved, mm.
+fn sweep(
+    poses: &[Option<RigidTransform>],
+    feet: &[Vec<Pull>],
+    datum: usize,
+) -> (Vec<Option<RigidTransform>>, f64) {
+    let mut farthest_mm = 0.0;
+    let swept = poses
+        .iter()
+        .zip(feet)
+        .enumerate()
+        .map(|(pose_idx, (pose, feet))| {
+            let theta = (*pose)?;
+            if pose_idx == datum {
+                return Some(theta);
+            }
+            let Some(eps) = closed_form_step(&theta, feet) else {
+                return Some(theta);
+            };
+            let next = moved(&theta, &eps);
+            farthest_mm = feet
+                .iter()
+                .map(|foot| (next.point(&foot.board_mm) - theta.point(&foot.board_mm)).norm())
+                .fold(farthest_mm, f64::max);
+            Some(next)
+        })
+        .collect();
+    (swept, farthest_mm)
+}
+
+/// Poses as a vector of numbers about those at the start: rotation vector times [`Chart::ARM_MM`]
+/// and shift, mm.
+struct Chart<'a> {
+    start: &'a [Option<RigidTransform>],
+    datum: usize,
+}
+
+impl<'a> Chart<'a> {
+    /// What makes a turn comparable with a shift: about the reach of a board from its middle.
+    const ARM_MM: f64 = 100.0;
+
+    fn new(start: &'a [Option<RigidTransform>], datum: usize) -> Self {
+        Self { start, datum }
+    }
+
+    /// The poses that move, with their starts.
+    fn moving(&self) -> impl Iterator<Item = (usize, &RigidTransform)> {
+        self.start
+            .iter()
+            .enumerate()
+            .filter(|(pose_idx, _)| *pose_idx != self.datum)
+            .filter_map(|(pose_idx, pose)| Some((pose_idx, pose.as_ref()?)))
+    }
+
+    fn numbers(&self, poses: &[Option<RigidTransform>]) -> DVector<f64> {
+        let numbers: Vec<f64> = self
+            .moving()
+            .flat_map(|(pose_idx, start)| {
+                let pose = poses[pose_idx].unwrap_or(*start);
+                let turn = so3::log(&(pose.rotation * start.rotation.transpose())) * Self::ARM_MM;
+                let shift = pose.translation_mm - start.translation_mm;
+                [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z]
+            })
+            .collect();
+        DVector::from_vec(numbers)
+    }
+
+    fn poses(&self, numbers: &DVector<f64>) -> Vec<Option<RigidTransform>> {
+        let mut poses = self.start.to_vec();
+        for (k, (pose_idx, start)) in self.moving().enumerate() {
+            let turn = numbers.fixed_rows::<3>(6 * k) / Self::ARM_MM;
+            let shift = numbers.fixed_rows::<3>(6 * k + 3).into_owned();
+            poses[pose_idx] = Some(start.perturbed(&turn, &shift));
+        }
+        poses
     }
 }
 
@@ -156,7 +244,7 @@ fn pulls(
         // In the pixels' order, whatever the number of threads.
         let rays: Vec<Option<Ray>> = camera
             .par_iter()
-            .map(|control| ray_of(control, poses, MIN_POSES_PER_PIXEL))
+            .map(|control| ray_of(control, poses, MIN_BOARDS))
             .collect();
         for (control, ray) in camera.iter().zip(rays) {
             let Some(ray) = ray else { continue };

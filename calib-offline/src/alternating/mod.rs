@@ -3,6 +3,7 @@
 pub mod alternation;
 pub mod k_means;
 pub mod line_fit;
+pub mod mixing;
 pub mod network;
 pub mod plane_map;
 pub mod pose_step;
@@ -99,6 +100,13 @@ pub fn experiment(
 ) -> Experiment {
     let maps = train(observations, network);
     let mut poses = start_poses(observations, fields);
+    if std::env::var("PINHOLE").is_ok() {
+        for (c, p) in poses.iter_mut().enumerate() {
+            let s = crate::pinhole::Settings { loss: crate::pinhole::Loss::StudentT, ..Default::default() };
+            let fit = crate::pinhole::calibrate_camera(observations, c, &s).unwrap();
+            *p = fit.camera_from_board;
+        }
+    }
     let board = observations.board;
     let corners: Vec<Vector3<f64>> = [(0, 0), (0, board.cols - 1), (board.rows - 1, 0), (board.rows - 1, board.cols - 1)]
         .map(|(r, c)| board.corner_in_board(r, c))
@@ -117,6 +125,12 @@ pub fn experiment(
             }
         }
     }
+    if std::env::var("PINRIG").is_ok() {
+        let mut s = crate::pinhole::RigSettings::default();
+        s.adjustment.loss = crate::pinhole::Loss::StudentT;
+        let rig = crate::pinhole::calibrate_rig(observations, &s).unwrap();
+        poses = vec![rig.first_from_board.clone(); 2];
+    }
     // all into the datum frame of camera 0
     let x = stereo::relative_pose(&poses[0], &poses[1], &corners).unwrap();
     for pose in poses[1].iter_mut().flatten() {
@@ -132,7 +146,7 @@ pub fn experiment(
         .enumerate()
         .map(|(c, sensor)| lattice(*sensor, 48.0).into_iter().map(|p| control(&maps[c], p)).collect())
         .collect();
-    let settings = AlternationSettings { sweeps, step_mm: 0.0 };
+    let settings = AlternationSettings { sweeps, step_mm: 0.0, mixing: std::env::var("MIX").map_or(0, |v| v.parse().unwrap()) };
     let fuse = |poses: &mut Vec<Vec<Option<RigidTransform>>>| {
         for k in 0..poses[0].len() {
             let both: Vec<RigidTransform> = poses.iter().filter_map(|p| p[k]).collect();
