@@ -48,7 +48,7 @@ pub enum Free {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Loss {
-    /// By its square and its corner's relative weight: what OpenCV does.
+    /// By its square and its corner's relative weight: what `OpenCV` does.
     #[default]
     LeastSquares,
     /// By a Student-t distribution fitted to the residuals, as in the joint estimate.

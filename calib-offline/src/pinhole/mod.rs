@@ -1,6 +1,6 @@
 //! The baseline: a pinhole with Brown-Conrady distortion per camera, calibrated from Zhang's closed
 //! form, and the places of the cameras to each other; what the publication compares with, and what
-//! OpenCV's `calibrateCamera` and `stereoCalibrate` compute from the same corners.
+//! `OpenCV`'s `calibrateCamera` and `stereoCalibrate` compute from the same corners.
 //!
 //! [`calibrate_camera`] takes one camera at a time: homographies ([`homography`]), focal lengths in
 //! closed form ([`zhang()`]), then all numbers and poses together ([`adjustment`]). It starts from the

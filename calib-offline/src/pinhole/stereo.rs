@@ -16,10 +16,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Refine {
-    /// The extrinsics; the intrinsics stay as each camera alone has them. OpenCV's `stereoCalibrate`
+    /// The extrinsics; the intrinsics stay as each camera alone has them. `OpenCV`'s `stereoCalibrate`
     /// as it comes (`CALIB_FIX_INTRINSIC`).
     Extrinsics,
-    /// The intrinsics as well, from where each camera alone has them (OpenCV's
+    /// The intrinsics as well, from where each camera alone has them (`OpenCV`'s
     /// `CALIB_USE_INTRINSIC_GUESS`).
     #[default]
     Everything,
@@ -38,7 +38,7 @@ pub struct RigSettings {
 /// together.
 ///
 /// Poses that one camera saw alone take part too: they tell nothing of the extrinsics but, where
-/// intrinsics move, of these. (OpenCV's `stereoCalibrate` takes common poses only.)
+/// intrinsics move, of these. (`OpenCV`'s `stereoCalibrate` takes common poses only.)
 ///
 /// # Errors
 /// What [`calibrate_camera`] says of any camera; [`InitError::NoCommonPose`];
