@@ -12,6 +12,7 @@ mod arrowhead;
 pub mod brown;
 pub mod calibrate_camera;
 pub mod homography;
+mod reprojection;
 pub mod rig;
 pub mod stereo;
 #[cfg(test)]
