@@ -82,7 +82,7 @@ pub struct CameraDeviations {
     /// Of `fx, fy, cx, cy, k1, k2, p1, p2, k3`.
     pub intrinsics: [f64; INTRINSICS],
     /// Of its place in the first camera's frame, by the perturbation of
-    /// [`RigidTransform::perturbed`]: rotation in rad, translation in mm.
+    /// [`crate::geometry::RigidTransform::perturbed`]: rotation in rad, translation in mm.
     pub place: [f64; 6],
 }
 

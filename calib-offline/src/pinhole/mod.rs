@@ -2,7 +2,7 @@
 //! form, and the places of the cameras to each other; what the publication compares with, and what
 //! `OpenCV`'s `calibrateCamera` and `stereoCalibrate` compute from the same corners.
 //!
-//! [`calibrate_camera`] takes one camera at a time: homographies ([`homography`]), focal lengths in
+//! [`calibrate_camera()`] takes one camera at a time: homographies ([`homography`]), focal lengths in
 //! closed form ([`zhang()`]), then all numbers and poses together ([`adjustment`]). It starts from the
 //! project's own initialization too and keeps the lower minimum. [`calibrate_rig`] joins the cameras
 //! over their common poses.

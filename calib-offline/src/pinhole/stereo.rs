@@ -20,7 +20,8 @@ pub enum Refine {
     /// as it comes (`CALIB_FIX_INTRINSIC`).
     Extrinsics,
     /// The intrinsics as well, from where each camera alone has them (`OpenCV`'s
-    /// `CALIB_USE_INTRINSIC_GUESS`).
+    /// `CALIB_USE_INTRINSIC_GUESS`). The default: the bench `pinhole` finds it better on lenses of the model
+    /// (1.0005 of the oracle's error against 1.0030) and by a tenth on most others.
     #[default]
     Everything,
 }
