@@ -8,12 +8,14 @@
 use calib_offline::adjust::Observations;
 use calib_offline::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
 use calib_offline::geometry::RigidTransform;
-use calib_offline::pinhole::BrownCamera;
+use calib_offline::init::focal_scan::start_camera;
 use calib_offline::pinhole::adjustment::{Free, State, minimize};
 use calib_offline::pinhole::{
-    Loss, PinholeRig, Refine, RigSettings, Settings, StartKind, calibrate_rig, stereo,
+    BrownCamera, Loss, PinholeRig, Refine, RigSettings, Settings, calibrate_rig, stereo,
 };
-use calib_offline::simulate::{CameraOptics, MatchSet, OpticsKind, Scene, SceneSettings};
+use calib_offline::simulate::{
+    CameraOptics, MatchSet, OpticsKind, Scene, SceneSettings, TrueMatch,
+};
 use clap::ValueEnum;
 use rayon::prelude::*;
 use std::process::ExitCode;
@@ -58,12 +60,12 @@ fn table(arguments: impl Iterator<Item = String>) -> Result<()> {
     }
     println!(
         "{draws} draws each. RMS error over the oracle's after the best rigid placement: points | held-out \
-         boards;\nstarts that reached the lowest minimum of each camera: conic, fixed center, focal scan; \
-         seconds per rig\n"
+         boards;\nof two cameras per draw, how many reached their lowest minimum from each start: conic, fixed \
+         center, focal\nscan; wall seconds of the whole rig, and of one adjustment of one camera\n"
     );
     println!(
-        "{:<10} {:>17} {:>17} {:>17} {:>8} {:>10} {:>7}",
-        "", "extrinsics only", "everything", "Student-t", "RMS px", "starts", "s"
+        "{:<11} {:>17} {:>17} {:>17} {:>8} {:>10} {:>7} {:>7}",
+        "", "extrinsics only", "everything", "Student-t", "RMS px", "starts", "rig s", "fit s"
     );
     for optics in optics {
         let drawn: Vec<Drawn> = (1..=draws)
@@ -80,38 +82,18 @@ struct Drawn {
     /// (points, held-out boards): extrinsics only, everything, everything with robust weights.
     ratios: [(f64, f64); 3],
     rms_px: f64,
-    /// Cameras whose lowest minimum a start reached, of two: in the order of [`StartKind`].
+    /// Cameras whose lowest minimum a start reached, of two: conic, fixed center, focal scan.
     reached: [usize; 3],
+    /// Of the whole rig, starts included.
     seconds: f64,
+    fit_seconds: f64,
 }
 
 fn draw(optics: OpticsKind, seed: u64) -> Result<Drawn> {
     let scene = Scene::new(SceneSettings::standard_noisy(optics, seed))?;
     let sensors = scene.cameras.iter().map(CameraOptics::sensor).collect();
     let observations = Observations::new(scene.settings.board, sensors, &scene.observe_corners());
-    let mut fit_seconds = f64::INFINITY;
-    {
-        let own = observations.of_camera(0);
-        let start = calib_offline::init::focal_scan::start_camera(&own, 0)?;
-        let state = State {
-            cameras: vec![BrownCamera::ideal(
-                own.sensors[0],
-                [start.field.base.focal_px; 2],
-                own.sensors[0].center(),
-            )],
-            camera_from_first: vec![RigidTransform::identity()],
-            first_from_board: start.camera_from_board,
-        };
-        let begun = Instant::now();
-        let o = minimize(state, &own, Free::Intrinsics, &Settings::default())?;
-        fit_seconds = fit_seconds.min(begun.elapsed().as_secs_f64());
-        println!(
-            "{} {} {fit_seconds} s, {} iterations",
-            optics.name(),
-            own.corner_count(),
-            o.iterations
-        );
-    }
+    let fit_seconds = fit_seconds(&observations.of_camera(0))?;
     let started = Instant::now();
     let everything = calibrate_rig(&observations, &RigSettings::default())?;
     let seconds = started.elapsed().as_secs_f64();
@@ -150,10 +132,26 @@ fn draw(optics: OpticsKind, seed: u64) -> Result<Drawn> {
         rms_px: everything.rms_px,
         reached,
         seconds,
+        fit_seconds,
     })
 }
 
-fn errors(rig: &PinholeRig, matches: &[calib_offline::simulate::TrueMatch]) -> Result<TruthErrors> {
+/// Of one adjustment of one camera from the focal scan's start.
+fn fit_seconds(own: &Observations) -> Result<f64> {
+    let start = start_camera(own, 0)?;
+    let sensor = own.sensors[0];
+    let focal_px = start.field.base.focal_px;
+    let state = State {
+        cameras: vec![BrownCamera::ideal(sensor, [focal_px; 2], sensor.center())],
+        camera_from_first: vec![RigidTransform::identity()],
+        first_from_board: start.camera_from_board,
+    };
+    let started = Instant::now();
+    minimize(state, own, Free::Intrinsics, &Settings::default())?;
+    Ok(started.elapsed().as_secs_f64())
+}
+
+fn errors(rig: &PinholeRig, matches: &[TrueMatch]) -> Result<TruthErrors> {
     let points: Vec<PointWithTruth> = matches
         .iter()
         .filter_map(|m| {
@@ -179,29 +177,17 @@ fn print(optics: OpticsKind, drawn: &[Drawn]) {
             mean(&|d| d.ratios[k].1)
         )
     };
-    let reached: Vec<String> = [
-        StartKind::ZhangConic,
-        StartKind::ZhangFixedCenter,
-        StartKind::FocalScan,
-    ]
-    .iter()
-    .enumerate()
-    .map(|(k, _)| {
-        drawn
-            .iter()
-            .map(|d| d.reached[k])
-            .sum::<usize>()
-            .to_string()
-    })
-    .collect();
+    let reached = [0, 1, 2].map(|k| drawn.iter().map(|d| d.reached[k]).sum::<usize>());
+    let [conic, fixed_center, focal_scan] = reached;
     println!(
-        "{:<10} {:>17} {:>17} {:>17} {:>8.4} {:>10} {:>7.3}",
+        "{:<11} {:>17} {:>17} {:>17} {:>8.4} {:>10} {:>7.3} {:>7.4}",
         optics.name(),
         column(0),
         column(1),
         column(2),
         mean(&|d| d.rms_px),
-        reached.join(" "),
+        format!("{conic} {fixed_center} {focal_scan}"),
         mean(&|d| d.seconds),
+        mean(&|d| d.fit_seconds),
     );
 }

@@ -1,4 +1,4 @@
-//! The baseline against OpenCV on the same corners; how the figures came about is said in
+//! The baseline against `OpenCV` on the same corners; how the figures came about is said in
 //! `data/opencv-figures/README.md`.
 
 use calib_offline::adjust::Observations;
@@ -16,8 +16,11 @@ use std::path::{Path, PathBuf};
 /// cost changes by less than a share e of itself, 1e-12 here; that leaves a parameter up to
 /// sqrt(e N) standard deviations off, N being the 1000 to 1400 numbers observed.
 const TOLERANCE_SIGMA: f64 = 4e-5;
-/// Of an RMS, as a share: half of the cost's.
+/// Of an RMS, as a share: half of the cost's, and round-off of sums of 1000 numbers.
 const TOLERANCE_RMS: f64 = 1e-11;
+/// `stereoCalibrate` with everything free ends before its minimum: its RMS may be higher than ours by
+/// this share, and the parameters are held against what that leaves.
+const EXCESS_RMS: f64 = 4e-9;
 /// With intrinsics held, what each camera alone left them off by acts on the common minimum in full:
 /// on its cost by more than the square, on the extrinsics by more than their own deviations, which
 /// are those for exact intrinsics.
@@ -60,7 +63,7 @@ fn figures(name: &str) -> Figures {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
-/// OpenCV keeps corners as 32-bit floats.
+/// `OpenCV` keeps corners as 32-bit floats.
 fn rounded(mut views: Vec<View>) -> Vec<View> {
     for corner in views.iter_mut().flat_map(|view| &mut view.corners) {
         corner.pixel.u = f64::from(corner.pixel.u as f32);
@@ -106,17 +109,23 @@ fn assert_near(what: &str, found: f64, expected: f64, tolerance: f64) {
 }
 
 fn compare_stereo(rig: &PinholeRig, figures: &StereoFigures, refine: Refine) {
-    let (tolerance_rms, tolerance_sigma) = match refine {
-        Refine::Extrinsics => (HELD_TOLERANCE_RMS, HELD_TOLERANCE_SIGMA),
-        Refine::Everything => (TOLERANCE_RMS, TOLERANCE_SIGMA),
-    };
     assert_eq!(rig.corner_count, figures.corners);
-    assert_near(
-        "RMS",
-        rig.rms_px,
-        figures.rms_px,
-        tolerance_rms * rig.rms_px,
-    );
+    let excess = figures.rms_px / rig.rms_px - 1.0;
+    let tolerance_sigma = match refine {
+        Refine::Extrinsics => {
+            assert!(excess.abs() <= HELD_TOLERANCE_RMS, "{excess:e}");
+            HELD_TOLERANCE_SIGMA
+        }
+        Refine::Everything => {
+            assert!(
+                (-TOLERANCE_RMS..=EXCESS_RMS).contains(&excess),
+                "{excess:e}"
+            );
+            // Twice the share in cost, two numbers per corner.
+            let left_over = 2.0 * excess.max(0.0) * 2.0 * rig.corner_count as f64;
+            TOLERANCE_SIGMA + left_over.sqrt()
+        }
+    };
     let deviations = rig.deviations.as_ref().unwrap();
     let place = deviations[1].place.map(|d| d * tolerance_sigma);
     let right_from_left = &rig.camera_from_first[1];

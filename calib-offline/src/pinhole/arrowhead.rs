@@ -36,6 +36,14 @@ pub struct Step {
     pub promised: f64,
 }
 
+/// The shared equations with the poses eliminated.
+struct Reduced {
+    shared: DMatrix<f64>,
+    right: DVector<f64>,
+    /// Inverses of the pose blocks.
+    pose_inverses: Vec<Matrix6<f64>>,
+}
+
 impl Arrowhead {
     /// Zeros.
     pub fn new(shared_count: usize, pose_count: usize) -> Self {
@@ -54,7 +62,11 @@ impl Arrowhead {
     /// The step with the diagonal of H enlarged by the factor `1 + damping`. `None` if the equations
     /// are singular even so.
     pub fn step(&self, damping: f64) -> Option<Step> {
-        let (reduced, right, eliminated) = self.reduce(damping)?;
+        let Reduced {
+            shared: reduced,
+            right,
+            pose_inverses,
+        } = self.reduce(damping)?;
         let shared = if reduced.is_empty() {
             right
         } else {
@@ -69,7 +81,7 @@ impl Arrowhead {
             model(*step, self.shared_gradient[k], self.shared[(k, k)]);
         }
         let mut poses = Vec::with_capacity(self.poses.len());
-        for (block, inverse) in self.poses.iter().zip(&eliminated) {
+        for (block, inverse) in self.poses.iter().zip(&pose_inverses) {
             let step = -(inverse * (block.gradient + block.cross.tr_mul(&shared)));
             for k in 0..6 {
                 model(step[k], block.gradient[k], block.own[(k, k)]);
@@ -86,7 +98,7 @@ impl Arrowhead {
     /// Covariance of the shared parameters for residuals of unit variance, the poses being free.
     /// `None` if the data do not determine them.
     pub fn shared_covariance(&self) -> Option<DMatrix<f64>> {
-        let (reduced, ..) = self.reduce(0.0)?;
+        let reduced = self.reduce(0.0)?.shared;
         // Scaled to a diagonal of ones, so that what is left of a pivot is a share.
         let scale = reduced.diagonal().map(|d| 1.0 / d.sqrt());
         if !scale.iter().all(|s| s.is_finite()) {
@@ -97,9 +109,8 @@ impl Arrowhead {
         Some(&scale * inverse * &scale)
     }
 
-    /// The shared equations with the poses eliminated, their right side, and the inverses of the
-    /// pose blocks.
-    fn reduce(&self, damping: f64) -> Option<(DMatrix<f64>, DVector<f64>, Vec<Matrix6<f64>>)> {
+    /// Eliminates the poses, the diagonal of H enlarged by the factor `1 + damping`.
+    fn reduce(&self, damping: f64) -> Option<Reduced> {
         let mut reduced = self.shared.clone();
         for k in 0..reduced.nrows() {
             reduced[(k, k)] *= 1.0 + damping;
@@ -117,7 +128,11 @@ impl Arrowhead {
             right.gemv(1.0, &product, &block.gradient, 1.0);
             inverses.push(inverse);
         }
-        Some((reduced, right, inverses))
+        Some(Reduced {
+            shared: reduced,
+            right,
+            pose_inverses: inverses,
+        })
     }
 }
 

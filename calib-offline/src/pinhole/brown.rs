@@ -1,4 +1,4 @@
-//! The pinhole camera with Brown-Conrady distortion, in OpenCV's order and convention.
+//! The pinhole camera with Brown-Conrady distortion, in `OpenCV`'s order and convention.
 
 use crate::geometry::{PixelPoint, Ray, SensorSize};
 use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector2, Vector3};
@@ -22,7 +22,7 @@ const ROUND_OFF: f64 = 1e-12;
 /// ```
 ///
 /// Frame: origin at the center of projection, z along the axis, x right, y down; mm. The center of
-/// the top-left pixel is (0, 0), in OpenCV as here.
+/// the top-left pixel is (0, 0), in `OpenCV` as here.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BrownCamera {
     /// The sensor.

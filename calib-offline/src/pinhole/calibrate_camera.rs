@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 pub enum StartKind {
     /// Zhang's closed form with all of the conic.
     ZhangConic,
-    /// Zhang's closed form with the principal point in the middle of the sensor: OpenCV's start.
+    /// Zhang's closed form with the principal point in the middle of the sensor: `OpenCV`'s start.
     ZhangFixedCenter,
     /// The project's own: ideal lenses of many focal lengths tried, poses through a cubic field.
     FocalScan,
@@ -50,7 +50,7 @@ pub struct CameraFit {
     pub starts: Vec<StartTried>,
     /// Sum of squared residuals, each with its corner's relative weight, px^2.
     pub cost_px2: f64,
-    /// Root mean square length of the residual vectors of the corners used, px: what OpenCV
+    /// Root mean square length of the residual vectors of the corners used, px: what `OpenCV`
     /// returns.
     pub rms_px: f64,
     /// Corners used.

@@ -1,8 +1,8 @@
 //! The baseline: a pinhole with Brown-Conrady distortion per camera, calibrated from Zhang's closed
 //! form, and the places of the cameras to each other; what the publication compares with, and what
-//! OpenCV's `calibrateCamera` and `stereoCalibrate` compute from the same corners.
+//! `OpenCV`'s `calibrateCamera` and `stereoCalibrate` compute from the same corners.
 //!
-//! [`calibrate_camera`] takes one camera at a time: homographies ([`homography`]), focal lengths in
+//! [`calibrate_camera()`] takes one camera at a time: homographies ([`homography`]), focal lengths in
 //! closed form ([`zhang()`]), then all numbers and poses together ([`adjustment`]). It starts from the
 //! project's own initialization too and keeps the lower minimum. [`calibrate_rig`] joins the cameras
 //! over their common poses.
@@ -12,6 +12,7 @@ mod arrowhead;
 pub mod brown;
 pub mod calibrate_camera;
 pub mod homography;
+mod reprojection;
 pub mod rig;
 pub mod stereo;
 #[cfg(test)]

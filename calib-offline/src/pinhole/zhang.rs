@@ -137,7 +137,7 @@ fn conic(pairs: &[[Vector3<f64>; 2]]) -> Option<ZhangCamera> {
 }
 
 /// `1/fu^2` and `1/fv^2` by least squares, the principal point being the origin: the form that
-/// OpenCV starts from.
+/// `OpenCV` starts from.
 fn fixed_center(pairs: &[[Vector3<f64>; 2]]) -> Option<ZhangCamera> {
     let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
     for [a, b] in pairs {
