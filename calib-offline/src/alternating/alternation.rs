@@ -10,7 +10,7 @@
 use super::line_fit::fit_line;
 use super::mixing::Mixing;
 use super::pose_step::{Pull, closed_form_step, moved};
-use crate::geometry::{PixelPoint, Ray, RigidTransform, so3};
+use crate::geometry::{Ray, RigidTransform, so3};
 use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -24,10 +24,17 @@ pub const MIN_DEPTH_SHARE: f64 = 0.01;
 /// Where one pixel looks on each board.
 #[derive(Debug, Clone)]
 pub struct PixelControl {
-    /// The pixel.
-    pub pixel: PixelPoint,
     /// (pose index, point in the board's frame, mm).
     pub boards: Vec<(usize, Vector3<f64>)>,
+}
+
+/// The pixels of one camera, and where it is about.
+#[derive(Debug, Clone)]
+pub struct CameraControl {
+    /// Pixels.
+    pub pixels: Vec<PixelControl>,
+    /// Place of the camera, frame of the poses, mm.
+    pub place_mm: Vector3<f64>,
 }
 
 /// When to stop.
@@ -95,22 +102,24 @@ pub fn control_points(
         .collect()
 }
 
-/// The ray of a pixel (15, 16); `None` if it sees fewer than `least` placed boards.
-pub fn ray_of(control: &PixelControl, poses: &[Option<RigidTransform>], least: usize) -> Option<Ray> {
-    let points: Vec<Vector3<f64>> = control_points(control, poses)
-        .into_iter()
-        .map(|(_, _, point)| point)
-        .collect();
-    (points.len() >= least).then(|| fit_line(&points)).flatten()
+/// Whether points support a line: their standard deviation along it is at least
+/// [`MIN_DEPTH_SHARE`] of their distance from the camera.
+pub fn is_supported(points: &[Vector3<f64>], line: &Ray, place_mm: &Vector3<f64>) -> bool {
+    let squared: f64 = points
+        .iter()
+        .map(|point| (point - line.origin_mm).dot(&line.direction).powi(2))
+        .sum();
+    let deviation = (squared / points.len() as f64).sqrt();
+    deviation >= MIN_DEPTH_SHARE * (line.origin_mm - place_mm).norm()
 }
 
-/// Alternates. `cameras` holds the pixels of each camera, all in the frame of the poses; the pose
-/// `datum` does not move.
+/// Alternates. The boards' poses are common to all `cameras`: each is pulled by the rays of all that
+/// see it. The pose `datum` does not move.
 ///
 /// Cost: a singular value decomposition per pixel and a few 3 x 3 products per control point and
 /// sweep.
 pub fn alternate(
-    cameras: &[&[PixelControl]],
+    cameras: &[CameraControl],
     start: &[Option<RigidTransform>],
     datum: usize,
     settings: &AlternationSettings,
@@ -233,32 +242,59 @@ impl<'a> Chart<'a> {
     }
 }
 
+/// RMS distance of control points from their rays (14) with given poses, mm; `None` if no pixel
+/// supports a ray.
+pub fn rms_mm(cameras: &[CameraControl], poses: &[Option<RigidTransform>]) -> Option<f64> {
+    let (feet, rms) = pulls(cameras, poses);
+    feet.iter().any(|feet| !feet.is_empty()).then_some(rms)
+}
+
 /// The foot points (29) of all control points by pose, and the RMS distance from them (14), mm.
-fn pulls(
-    cameras: &[&[PixelControl]],
-    poses: &[Option<RigidTransform>],
-) -> (Vec<Vec<Pull>>, f64) {
+fn pulls(cameras: &[CameraControl], poses: &[Option<RigidTransform>]) -> (Vec<Vec<Pull>>, f64) {
     let mut by_pose: Vec<Vec<Pull>> = vec![Vec::new(); poses.len()];
     let (mut squared, mut count) = (0.0, 0.0);
     for camera in cameras {
         // In the pixels' order, whatever the number of threads.
-        let rays: Vec<Option<Ray>> = camera
+        let feet: Vec<Vec<(usize, Pull)>> = camera
+            .pixels
             .par_iter()
-            .map(|control| ray_of(control, poses, MIN_BOARDS))
+            .map(|control| feet_of(control, poses, &camera.place_mm))
             .collect();
-        for (control, ray) in camera.iter().zip(rays) {
-            let Some(ray) = ray else { continue };
-            for (pose_idx, board_mm, point) in control_points(control, poses) {
-                let foot_mm = ray.foot_point(&point);
-                squared += (foot_mm - point).norm_squared();
-                count += 1.0;
-                by_pose[pose_idx].push(Pull {
-                    board_mm,
-                    foot_mm,
-                    weight: 1.0,
-                });
-            }
+        for (pose_idx, pull) in feet.into_iter().flatten() {
+            let point = poses[pose_idx].map_or(pull.foot_mm, |theta| theta.point(&pull.board_mm));
+            squared += (pull.foot_mm - point).norm_squared();
+            count += 1.0;
+            by_pose[pose_idx].push(pull);
         }
     }
     (by_pose, (squared / f64::max(count, 1.0)).sqrt())
+}
+
+/// The foot points (29) of one pixel's control points on its ray (15, 16), by pose index; none if
+/// they support no ray.
+fn feet_of(
+    control: &PixelControl,
+    poses: &[Option<RigidTransform>],
+    place_mm: &Vector3<f64>,
+) -> Vec<(usize, Pull)> {
+    let controls = control_points(control, poses);
+    let points: Vec<Vector3<f64>> = controls.iter().map(|(_, _, point)| *point).collect();
+    if points.len() < MIN_BOARDS {
+        return Vec::new();
+    }
+    let line = fit_line(&points).filter(|line| is_supported(&points, line, place_mm));
+    let Some(line) = line else {
+        return Vec::new();
+    };
+    controls
+        .into_iter()
+        .map(|(pose_idx, board_mm, point)| {
+            let pull = Pull {
+                board_mm,
+                foot_mm: line.foot_point(&point),
+                weight: 1.0,
+            };
+            (pose_idx, pull)
+        })
+        .collect()
 }

@@ -83,7 +83,10 @@ mod tests {
             .collect();
         let centers = k_means(&points, 3, 1);
         for mean in means {
-            let gap = centers.iter().map(|c| (c - mean).norm()).fold(f64::MAX, f64::min);
+            let gap = centers
+                .iter()
+                .map(|c| (c - mean).norm())
+                .fold(f64::MAX, f64::min);
             assert!(gap < 1e-12, "{mean} is {gap} away");
         }
         assert_eq!(centers, k_means(&points, 3, 1));

@@ -46,12 +46,14 @@ impl Distances {
 
     /// The hidden layer's answers, the bias first.
     fn hidden(&self, beta: f64) -> DMatrix<f64> {
-        DMatrix::from_fn(self.squared.nrows(), self.squared.ncols() + 1, |i, k| {
-            match k.checked_sub(1) {
+        DMatrix::from_fn(
+            self.squared.nrows(),
+            self.squared.ncols() + 1,
+            |i, k| match k.checked_sub(1) {
                 None => 1.0,
                 Some(neuron) => (-beta * self.squared[(i, neuron)]).exp(),
-            }
-        })
+            },
+        )
     }
 
     /// The network of a spread that comes nearest to the outputs (mm, one per input) in the

@@ -5,7 +5,8 @@ use super::network::{Distances, Network};
 use crate::adjust::observations::ObservedCorner;
 use crate::geometry::PixelPoint;
 use crate::geometry::hull::{convex_hull, hull_contains};
-use nalgebra::{Vector2, Vector3};
+use crate::init::bearing_pose::BoardHomography;
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// Fewest corners that a network is trained on.
 pub const MIN_CORNERS: usize = 12;
@@ -27,12 +28,69 @@ pub struct NetworkSettings {
     pub neurons: usize,
     /// Seed of the neurons' places.
     pub seed: u64,
+    /// Whether the networks learn only what a homography leaves.
+    pub warp: bool,
+}
+
+/// A trained network, on top of a homography if there is one.
+#[derive(Debug, Clone)]
+pub struct BoardNetwork {
+    network: Network,
+    /// Board points (mm, homogeneous) from pixels.
+    warp: Option<Matrix3<f64>>,
+}
+
+impl BoardNetwork {
+    /// Where on the board a pixel looks, mm.
+    pub fn evaluate(&self, pixel: PixelPoint) -> Vector2<f64> {
+        warped(self.warp.as_ref(), pixel) + self.network.evaluate(pixel)
+    }
+}
+
+/// What the homography alone says, mm; zero without one.
+fn warped(warp: Option<&Matrix3<f64>>, pixel: PixelPoint) -> Vector2<f64> {
+    warp.map_or_else(Vector2::zeros, |warp| {
+        let point = warp * Vector3::new(pixel.u, pixel.v, 1.0);
+        point.xy() / point.z
+    })
+}
+
+/// The homography of corners, from pixels to the board; `None` if they have none.
+fn homography(corners: &[ObservedCorner]) -> Option<Matrix3<f64>> {
+    let count = corners.len() as f64;
+    let mean = |of: fn(&ObservedCorner) -> f64| corners.iter().map(of).sum::<f64>() / count;
+    let (u, v) = (mean(|c| c.pixel.u), mean(|c| c.pixel.v));
+    let reach = corners
+        .iter()
+        .map(|c| (c.pixel.u - u).hypot(c.pixel.v - v))
+        .fold(1.0, f64::max);
+    // Pixels about their middle and of the size of 1, for the digits.
+    let unit_from_pixel = Matrix3::new(
+        1.0 / reach,
+        0.0,
+        -u / reach,
+        0.0,
+        1.0 / reach,
+        -v / reach,
+        0.0,
+        0.0,
+        1.0,
+    );
+    let (units, points): (Vec<_>, Vec<_>) = corners
+        .iter()
+        .map(|c| {
+            let pixel = Vector3::new(c.pixel.u, c.pixel.v, 1.0);
+            (unit_from_pixel * pixel, c.point_in_board)
+        })
+        .unzip();
+    let unit_from_board = BoardHomography::fit(&units, &points)?.matrix();
+    Some(unit_from_board.try_inverse()? * unit_from_pixel)
 }
 
 /// The map of one view.
 #[derive(Debug, Clone)]
 pub struct PlaneMap {
-    network: Network,
+    network: BoardNetwork,
     hull: Vec<PixelPoint>,
 }
 
@@ -40,11 +98,13 @@ pub struct PlaneMap {
 pub struct TrainingSet {
     distances: Distances,
     outputs_mm: Vec<Vector2<f64>>,
+    warp: Option<Matrix3<f64>>,
 }
 
 impl TrainingSet {
-    /// Places neurons among the corners; `None` if there are too few corners.
-    pub fn new(corners: &[ObservedCorner], neurons: usize, seed: u64) -> Option<Self> {
+    /// Places neurons among the corners; `None` if there are too few corners. The spread is not
+    /// used.
+    pub fn new(corners: &[ObservedCorner], settings: &NetworkSettings) -> Option<Self> {
         if corners.len() < MIN_CORNERS {
             return None;
         }
@@ -52,17 +112,29 @@ impl TrainingSet {
             .iter()
             .map(|corner| Vector2::new(corner.pixel.u, corner.pixel.v))
             .collect();
-        let count = neurons.min(corners.len() / CORNERS_PER_NEURON);
-        let centers = k_means(&inputs, count, seed);
+        let count = settings.neurons.min(corners.len() / CORNERS_PER_NEURON);
+        let centers = k_means(&inputs, count, settings.seed);
+        let warp = if settings.warp {
+            Some(homography(corners)?)
+        } else {
+            None
+        };
         Some(Self {
             distances: Distances::new(&inputs, centers),
-            outputs_mm: corners.iter().map(|c| c.point_in_board.xy()).collect(),
+            outputs_mm: corners
+                .iter()
+                .map(|c| c.point_in_board.xy() - warped(warp.as_ref(), c.pixel))
+                .collect(),
+            warp,
         })
     }
 
     /// The network of a spread.
-    pub fn train(&self, spread_px: f64) -> Option<Network> {
-        self.distances.train(&self.outputs_mm, spread_px)
+    pub fn train(&self, spread_px: f64) -> Option<BoardNetwork> {
+        Some(BoardNetwork {
+            network: self.distances.train(&self.outputs_mm, spread_px)?,
+            warp: self.warp,
+        })
     }
 }
 
@@ -72,7 +144,7 @@ impl PlaneMap {
     /// `None` for fewer than [`MIN_CORNERS`] corners.
     pub fn train(corners: &[ObservedCorner], settings: &NetworkSettings) -> Option<Self> {
         let train = |corners: &[ObservedCorner]| {
-            TrainingSet::new(corners, settings.neurons, settings.seed)?.train(settings.spread_px)
+            TrainingSet::new(corners, settings)?.train(settings.spread_px)
         };
         let mut network = train(corners)?;
         let kept = without_outliers(&network, corners);
@@ -96,14 +168,14 @@ impl PlaneMap {
 }
 
 /// Errors of a network at corners, mm.
-pub fn errors_mm(network: &Network, corners: &[ObservedCorner]) -> Vec<f64> {
+pub fn errors_mm(network: &BoardNetwork, corners: &[ObservedCorner]) -> Vec<f64> {
     corners
         .iter()
         .map(|corner| (network.evaluate(corner.pixel) - corner.point_in_board.xy()).norm())
         .collect()
 }
 
-fn without_outliers(network: &Network, corners: &[ObservedCorner]) -> Vec<ObservedCorner> {
+fn without_outliers(network: &BoardNetwork, corners: &[ObservedCorner]) -> Vec<ObservedCorner> {
     let errors = errors_mm(network, corners);
     let mut sorted = errors.clone();
     sorted.sort_by(f64::total_cmp);

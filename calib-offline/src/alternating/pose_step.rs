@@ -138,9 +138,7 @@ mod tests {
             by_eps
                 .fixed_view_mut::<3, 3>(0, 0)
                 .copy_from(&Matrix3::identity());
-            by_eps
-                .fixed_view_mut::<3, 3>(0, 3)
-                .copy_from(&-skew(&pe));
+            by_eps.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew(&pe));
             normal += by_eps.tr_mul(&by_eps) * pull.weight;
             right += by_eps.tr_mul(&(pull.foot_mm - pe)) * pull.weight;
         }

@@ -159,9 +159,15 @@ mod tests {
     use super::*;
 
     fn corners() -> Vec<Vector3<f64>> {
-        [[0.0, 0.0], [120.0, 0.0], [0.0, 140.0], [120.0, 140.0], [50.0, 30.0]]
-            .map(|[x, y]| Vector3::new(x, y, 0.0))
-            .into()
+        [
+            [0.0, 0.0],
+            [120.0, 0.0],
+            [0.0, 140.0],
+            [120.0, 140.0],
+            [50.0, 30.0],
+        ]
+        .map(|[x, y]| Vector3::new(x, y, 0.0))
+        .into()
     }
 
     /// Boards about an axis through `point`.

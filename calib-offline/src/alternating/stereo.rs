@@ -130,7 +130,11 @@ mod tests {
             .map(|pose| Some(to_from_from * *pose))
             .chain([None])
             .collect();
-        let from: Vec<_> = [None].into_iter().chain(boards[1..].iter().map(|p| Some(*p))).chain([Some(boards[0])]).collect();
+        let from: Vec<_> = [None]
+            .into_iter()
+            .chain(boards[1..].iter().map(|p| Some(*p)))
+            .chain([Some(boards[0])])
+            .collect();
         let corners = [[0.0, 0.0, 0.0], [90.0, 0.0, 0.0], [0.0, 80.0, 0.0]].map(Vector3::from);
         let found = relative_pose(&to, &from, &corners).unwrap();
         assert!((found.rotation - to_from_from.rotation).norm() < 1e-13);
