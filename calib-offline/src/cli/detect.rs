@@ -296,6 +296,7 @@ mod tests {
             }],
             stage: None,
             excluded_poses: std::collections::BTreeSet::new(),
+            target: None,
         };
         let overlays = folder.path().join("overlays");
         let args = DetectArgs {
