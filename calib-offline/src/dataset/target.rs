@@ -116,7 +116,9 @@ impl TargetSpec {
                 self.direction.contains(&turned((row, col), size, quarters))
             })
         };
-        let turn = turns.iter().filter(|&&k| k > 0 && maps_onto_itself(false, k));
+        let turn = turns
+            .iter()
+            .filter(|&&k| k > 0 && maps_onto_itself(false, k));
         let mirror = turns.iter().filter(|&&k| maps_onto_itself(true, k));
         turn.map(|&k| TargetSymmetry::Turn(k))
             .chain(mirror.map(|&k| TargetSymmetry::Mirror(k)))
@@ -207,7 +209,11 @@ mod tests {
         }
         assert_eq!(place, (1, 2));
         for k in 0..4u8 {
-            let twice = turned(turned((1, 2), size, k), if k % 2 == 0 { size } else { (9, 7) }, 4 - k);
+            let twice = turned(
+                turned((1, 2), size, k),
+                if k % 2 == 0 { size } else { (9, 7) },
+                4 - k,
+            );
             assert_eq!(twice, (1, 2));
         }
     }

@@ -73,7 +73,9 @@ pub enum TargetProblem {
         have: usize,
     },
     /// A direction marker that the target does not have.
-    #[error("[target] direction: [{row}, {col}] is not on the target of {rows} rows and {cols} cols")]
+    #[error(
+        "[target] direction: [{row}, {col}] is not on the target of {rows} rows and {cols} cols"
+    )]
     OffTarget {
         /// The row.
         row: i64,
@@ -150,7 +152,9 @@ impl TargetProblem {
             Self::Length { .. } => "give the length in mm, measured on the target",
             Self::NotLarger { .. } => "swap the two if they were mixed up",
             Self::Touching { .. } => "give radii, not diameters",
-            Self::NoPlace { .. } | Self::OffTarget { .. } => "write [row, col] of each, counted from 0",
+            Self::NoPlace { .. } | Self::OffTarget { .. } => {
+                "write [row, col] of each, counted from 0"
+            }
             Self::DirectionTwice { .. } => "name each larger marker once",
             Self::TooManyDirections { .. } => {
                 "name the larger markers; the smaller ones must be the usual ones"
@@ -268,9 +272,7 @@ fn described(source: &Source, line: usize, raw: RawTarget) -> Result<TargetSpec,
         };
         return Err(source.problem(direction_line, problem));
     }
-    let direction = raw
-        .direction
-        .ok_or_else(|| missing("[target] direction"))?;
+    let direction = raw.direction.ok_or_else(|| missing("[target] direction"))?;
     let target = TargetSpec {
         rows,
         cols,

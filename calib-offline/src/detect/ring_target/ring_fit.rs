@@ -1,0 +1,559 @@
+//! Where a ring is, to a hundredth of a pixel: its two blurred edges fitted to the image.
+//!
+//! The image is modelled as `(1 + g . d) (b + (r - b) S)`: b, r the brightness around and on the ring,
+//! g a slope of the light over the distance d from the middle, and S how much of a pixel's
+//! surroundings lies on the ring: the difference of two steps across ellipses, blurred by a Gaussian.
+//! Both ellipses have one shape but for their size. Eleven unknowns (center, shape, inner against
+//! outer radius, two levels, two slopes, blur) are found by least squares over all pixels near the
+//! edges. The slope matters: light that changes by 0.5 % over a ring moves both of its sides
+//! the same way.
+//!
+//! Under perspective the center of a circle's image is not the image of its center, and two
+//! concentric circles have images with two centers. [`EdgeOffsets`] says by how much each edge lies
+//! aside, so that the fitted center is the image of the circles' own ([`super::perspective`]).
+
+use super::candidates::{RingGuess, square_root};
+use super::components::Polarity;
+use crate::dataset::image::GrayImage;
+use crate::geometry::PixelPoint;
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+use std::f64::consts::{FRAC_2_SQRT_PI, SQRT_2};
+
+/// Only pixels this near to an edge are looked at, px; a blur of a quarter of it needs more.
+const BAND_PX: f64 = 8.0;
+/// Standard deviations of the blur to either side of an edge that the band has at least.
+const BAND_BLURS: f64 = 4.0;
+/// Windows with fewer pixels do not determine eleven unknowns well.
+const MIN_PIXELS: usize = 40;
+/// The window follows the ring: fitted twice, the second time around the first result.
+const ROUNDS: usize = 2;
+const MAX_ITERATIONS: usize = 30;
+/// A step of all lengths below this many pixels ends the iteration.
+const STEP_TOLERANCE: f64 = 1e-5;
+/// Beyond this many standard deviations of the blur an edge is flat to 1e-6.
+const FLAT_BEYOND: f64 = 5.0;
+/// Blur is kept between these bounds while iterating, px.
+const BLUR_RANGE_PX: (f64, f64) = (0.1, 20.0);
+/// And the ratio of the radii between these.
+const RATIO_RANGE: (f64, f64) = (0.05, 0.97);
+/// Rings whose fit leaves more than this part of their contrast (RMS) are none.
+const MAX_RESIDUAL: f64 = 0.12;
+/// The fit must stay this near to the guess, as a part of its radius.
+const MAX_MOVE: f64 = 0.4;
+
+const COUNT: usize = 11;
+type Parameters = SVector<f64, COUNT>;
+type Normal = SMatrix<f64, COUNT, COUNT>;
+const SHAPE: usize = 2;
+const RATIO: usize = 5;
+const AROUND: usize = 6;
+const PRINT: usize = 7;
+const SLOPE: usize = 8;
+const BLUR: usize = 10;
+
+/// How far the middles of the edges' ellipses lie from the image of the ring's center, px.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EdgeOffsets {
+    /// Of the outer edge.
+    pub outer: Vector2<f64>,
+    /// Of the inner edge.
+    pub inner: Vector2<f64>,
+}
+
+impl EdgeOffsets {
+    /// No perspective.
+    pub const NONE: Self = Self {
+        outer: Vector2::new(0.0, 0.0),
+        inner: Vector2::new(0.0, 0.0),
+    };
+}
+
+/// A fitted ring.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FittedRing {
+    /// The image of its center, as far as the offsets given say; without them, the middle of its
+    /// edges.
+    pub pixel: PixelPoint,
+    /// Symmetric; maps the unit circle to the outer edge, px.
+    pub shape: Matrix2<f64>,
+    /// Inner against outer radius.
+    pub ratio: f64,
+    /// Standard deviation per axis that the residuals of this fit predict, px.
+    pub sigma_px: f64,
+    /// Brightness of the ring less that around it, code values: negative for dark rings.
+    pub contrast: f64,
+    /// Standard deviation of the blur, px.
+    pub blur_px: f64,
+    /// RMS of the residuals, code values.
+    pub residual_rms: f64,
+}
+
+impl FittedRing {
+    /// Radius of the circle with the outer edge's area, px.
+    pub fn mean_radius_px(&self) -> f64 {
+        self.shape.determinant().abs().sqrt()
+    }
+
+    /// The ring as a guess for another fit.
+    pub fn as_guess(&self) -> RingGuess {
+        RingGuess {
+            center: Vector2::new(self.pixel.u, self.pixel.v),
+            shape: self.shape,
+            ratio: self.ratio,
+            polarity: if self.contrast < 0.0 {
+                Polarity::Dark
+            } else {
+                Polarity::Bright
+            },
+        }
+    }
+
+    /// Fits a ring; `None` if the guess is not wholly in the image or no such ring is there.
+    ///
+    /// `reach` bounds the window: pixels up to so many outer radii from the middle, which must end
+    /// before the next marker begins.
+    pub fn fit(
+        image: &GrayImage,
+        guess: &RingGuess,
+        offsets: &EdgeOffsets,
+        reach: f64,
+    ) -> Option<Self> {
+        let mut model = RingModel::start(image, guess, reach)?;
+        let mut outcome = None;
+        for _ in 0..ROUNDS {
+            let window = Window::around(image, &model, offsets, reach)?;
+            let solved = solve(model, offsets, &window)?;
+            model = solved.0;
+            if (model.center() - guess.center).norm() > MAX_MOVE * guess.mean_radius_px() {
+                return None;
+            }
+            outcome = Some(solved);
+        }
+        let (model, covariance, residual_rms) = outcome?;
+        let fitted = Self {
+            pixel: PixelPoint::new(model.0[0], model.0[1]),
+            shape: model.shape(),
+            ratio: model.0[RATIO],
+            sigma_px: f64::midpoint(covariance[(0, 0)], covariance[(1, 1)]).sqrt(),
+            contrast: model.0[PRINT] - model.0[AROUND],
+            blur_px: model.0[BLUR],
+            residual_rms,
+        };
+        let right_sign = (fitted.contrast < 0.0) == (guess.polarity == Polarity::Dark);
+        let inside = (RATIO_RANGE.0 + 0.01..RATIO_RANGE.1 - 0.01).contains(&fitted.ratio);
+        let is_ring = right_sign
+            && inside
+            && residual_rms < MAX_RESIDUAL * fitted.contrast.abs()
+            && fitted.sigma_px.is_finite();
+        is_ring.then_some(fitted)
+    }
+}
+
+/// u, v; shape (uu, uv, vv); ratio; brightness around and on the ring; slopes of the light along u
+/// and v (per outer radius); blur.
+#[derive(Debug, Clone, Copy)]
+struct RingModel(Parameters);
+
+impl RingModel {
+    fn start(image: &GrayImage, guess: &RingGuess, reach: f64) -> Option<Self> {
+        let inverse = guess.shape.try_inverse()?;
+        let between = 1.0 - guess.ratio;
+        let (mut print, mut around) = ((0.0, 0.0), (0.0, 0.0));
+        for (at, value) in pixels_around(image, &guess.center, &guess.shape, reach)? {
+            let radius = (inverse * (at - guess.center)).norm();
+            let depth = (radius - guess.ratio) / between;
+            if (0.25..0.75).contains(&depth) {
+                print = (print.0 + value, print.1 + 1.0);
+            } else if !(-0.25..1.25).contains(&depth) {
+                around = (around.0 + value, around.1 + 1.0);
+            }
+        }
+        let mean = |(sum, count): (f64, f64)| (count > 0.0).then(|| sum / count);
+        let (print, around) = (mean(print)?, mean(around)?);
+        Some(Self(Parameters::from([
+            guess.center.x,
+            guess.center.y,
+            guess.shape[(0, 0)],
+            guess.shape[(0, 1)],
+            guess.shape[(1, 1)],
+            guess.ratio,
+            around,
+            print,
+            0.0,
+            0.0,
+            1.0,
+        ])))
+    }
+
+    fn center(&self) -> Vector2<f64> {
+        Vector2::new(self.0[0], self.0[1])
+    }
+
+    fn shape(&self) -> Matrix2<f64> {
+        Matrix2::new(
+            self.0[SHAPE],
+            self.0[SHAPE + 1],
+            self.0[SHAPE + 1],
+            self.0[SHAPE + 2],
+        )
+    }
+
+    fn edges(&self, offsets: &EdgeOffsets) -> Option<RingEdges> {
+        let shape = self.shape();
+        let inverse = shape.try_inverse()?;
+        let ratio = self.0[RATIO];
+        Some(RingEdges {
+            outer: Edge {
+                center: self.center() + offsets.outer,
+                inverse,
+            },
+            inner: Edge {
+                center: self.center() + offsets.inner,
+                inverse: inverse / ratio,
+            },
+            center: self.center(),
+            shape,
+            ratio,
+            radius_px: shape.determinant().abs().sqrt(),
+            around: self.0[AROUND],
+            print: self.0[PRINT],
+            slope: Vector2::new(self.0[SLOPE], self.0[SLOPE + 1]),
+            blur: self.0[BLUR],
+        })
+    }
+}
+
+/// One elliptic edge.
+struct Edge {
+    center: Vector2<f64>,
+    /// Maps the ellipse to the unit circle.
+    inverse: Matrix2<f64>,
+}
+
+/// A point beside an edge.
+struct Beside {
+    /// Distance from the edge, positive inside, to first order, px.
+    depth: f64,
+    /// Outward normal of the edge.
+    normal: Vector2<f64>,
+    /// Where on the unit circle.
+    on_circle: Vector2<f64>,
+}
+
+impl Edge {
+    fn beside(&self, at: &Vector2<f64>) -> Beside {
+        let w = self.inverse * (at - self.center);
+        let radius = w.norm().max(1e-9);
+        let gradient = self.inverse.transpose() * w / radius;
+        let steepness = gradient.norm().max(1e-12);
+        Beside {
+            depth: (1.0 - radius) / steepness,
+            normal: gradient / steepness,
+            on_circle: w / radius,
+        }
+    }
+}
+
+/// A model, ready to be evaluated at many pixels.
+struct RingEdges {
+    outer: Edge,
+    inner: Edge,
+    center: Vector2<f64>,
+    shape: Matrix2<f64>,
+    ratio: f64,
+    radius_px: f64,
+    around: f64,
+    print: f64,
+    slope: Vector2<f64>,
+    blur: f64,
+}
+
+impl RingEdges {
+    /// The model's value at a pixel and its derivatives by the parameters, exact at the edges and
+    /// to first order beside them.
+    fn value_and_gradient(&self, at: &Vector2<f64>) -> (f64, Parameters) {
+        let (outer, inner) = (self.outer.beside(at), self.inner.beside(at));
+        let (in_outer, by_outer) = blurred_step(outer.depth, self.blur);
+        let (in_inner, by_inner) = blurred_step(inner.depth, self.blur);
+        let share = in_outer - in_inner;
+        let aside = (at - self.center) / self.radius_px;
+        let light = 1.0 + self.slope.dot(&aside);
+        let value = self.around + (self.print - self.around) * share;
+        let by_share = light * (self.print - self.around);
+        let (by_outer, by_inner) = (by_share * by_outer, -by_share * by_inner);
+        // An edge that moves outward by n . x gains as much depth.
+        let by_center = outer.normal * by_outer + inner.normal * by_inner;
+        let by_shape = |beside: &Beside, scale: f64| {
+            let (n, w) = (beside.normal * scale, beside.on_circle);
+            [n.x * w.x, n.x * w.y + n.y * w.x, n.y * w.y]
+        };
+        let (a, b) = (
+            by_shape(&outer, by_outer),
+            by_shape(&inner, by_inner * self.ratio),
+        );
+        let gradient = Parameters::from([
+            by_center.x,
+            by_center.y,
+            a[0] + b[0],
+            a[1] + b[1],
+            a[2] + b[2],
+            by_inner * inner.normal.dot(&(self.shape * inner.on_circle)),
+            light * (1.0 - share),
+            light * share,
+            aside.x * value,
+            aside.y * value,
+            -(by_outer * outer.depth + by_inner * inner.depth) / self.blur,
+        ]);
+        (light * value, gradient)
+    }
+}
+
+/// `(1 + erf(n / (s sqrt 2))) / 2` and its derivative by n.
+fn blurred_step(n: f64, blur: f64) -> (f64, f64) {
+    if n.abs() > FLAT_BEYOND * blur {
+        return (if n > 0.0 { 1.0 } else { 0.0 }, 0.0);
+    }
+    let x = n / (blur * SQRT_2);
+    (
+        f64::midpoint(1.0, libm::erf(x)),
+        0.5 * FRAC_2_SQRT_PI / (blur * SQRT_2) * (-x * x).exp(),
+    )
+}
+
+/// The pixels up to `reach` outer radii from the middle; `None` unless the ellipse itself lies in
+/// the image.
+fn pixels_around<'a>(
+    image: &'a GrayImage,
+    center: &Vector2<f64>,
+    shape: &Matrix2<f64>,
+    reach: f64,
+) -> Option<impl Iterator<Item = (Vector2<f64>, f64)> + 'a> {
+    let inverse = shape.try_inverse()?;
+    let center = *center;
+    // Half the sides of the box around the ellipse.
+    let half = |row: usize| shape.row(row).norm();
+    let (half_u, half_v) = (half(0), half(1));
+    let corner = |sign: f64| PixelPoint::new(center.x + sign * half_u, center.y + sign * half_v);
+    if !(image.sensor.contains(corner(-1.0)) && image.sensor.contains(corner(1.0))) {
+        return None;
+    }
+    let range = |middle: f64, half: f64| {
+        (middle - reach * half).floor() as i64..=(middle + reach * half).ceil() as i64
+    };
+    let columns = range(center.x, half_u);
+    let inside = range(center.y, half_v).flat_map(move |v| {
+        columns.clone().filter_map(move |u| {
+            let at = Vector2::new(u as f64, v as f64);
+            let near = (inverse * (at - center)).norm() <= reach;
+            near.then(|| image.at(u, v))
+                .flatten()
+                .map(|value| (at, f64::from(value)))
+        })
+    });
+    Some(inside)
+}
+
+/// The pixels of a fit.
+struct Window {
+    pixels: Vec<(Vector2<f64>, f64)>,
+}
+
+impl Window {
+    fn around(
+        image: &GrayImage,
+        model: &RingModel,
+        offsets: &EdgeOffsets,
+        reach: f64,
+    ) -> Option<Self> {
+        let edges = model.edges(offsets)?;
+        let band = BAND_PX.max(BAND_BLURS * edges.blur);
+        let near = |edge: &Edge, at: &Vector2<f64>| edge.beside(at).depth.abs() <= band;
+        let pixels: Vec<_> = pixels_around(image, &edges.center, &edges.shape, reach)?
+            .filter(|(at, _)| near(&edges.outer, at) || near(&edges.inner, at))
+            .collect();
+        (pixels.len() >= MIN_PIXELS).then_some(Self { pixels })
+    }
+
+    fn normal_equations(
+        &self,
+        model: &RingModel,
+        offsets: &EdgeOffsets,
+    ) -> Option<NormalEquations> {
+        let edges = model.edges(offsets)?;
+        let (mut normal, mut right) = (Normal::zeros(), Parameters::zeros());
+        let mut cost = 0.0;
+        for (at, value) in &self.pixels {
+            let (predicted, gradient) = edges.value_and_gradient(at);
+            let residual = value - predicted;
+            normal.ger(1.0, &gradient, &gradient, 1.0);
+            right.axpy(residual, &gradient, 1.0);
+            cost += residual * residual;
+        }
+        Some(NormalEquations {
+            normal,
+            right,
+            cost,
+        })
+    }
+}
+
+struct NormalEquations {
+    normal: Normal,
+    right: Parameters,
+    cost: f64,
+}
+
+/// Levenberg-Marquardt: the model, its covariance from the residuals' own variance, their RMS.
+fn solve(
+    start: RingModel,
+    offsets: &EdgeOffsets,
+    window: &Window,
+) -> Option<(RingModel, Normal, f64)> {
+    let mut model = start;
+    let mut at = window.normal_equations(&model, offsets)?;
+    let mut damping = 1e-3;
+    for _ in 0..MAX_ITERATIONS {
+        let mut damped = at.normal;
+        for k in 0..COUNT {
+            damped[(k, k)] *= 1.0 + damping;
+        }
+        let step = damped.cholesky()?.solve(&at.right);
+        let mut next = RingModel(model.0 + step);
+        next.0[BLUR] = next.0[BLUR].clamp(BLUR_RANGE_PX.0, BLUR_RANGE_PX.1);
+        next.0[RATIO] = next.0[RATIO].clamp(RATIO_RANGE.0, RATIO_RANGE.1);
+        let at_next = window.normal_equations(&next, offsets)?;
+        if at_next.cost <= at.cost {
+            (model, at) = (next, at_next);
+            damping = (damping * 0.1).max(1e-9);
+        } else {
+            damping *= 10.0;
+        }
+        // A short step ends it whether or not it still improves the fit.
+        if step.fixed_rows::<5>(0).amax() < STEP_TOLERANCE {
+            break;
+        }
+    }
+    // The shape is kept positive definite: a fit that turned it over found something else.
+    let shape = model.shape();
+    if !(shape.trace() > 0.0 && shape.determinant() > 0.0) {
+        return None;
+    }
+    let count = window.pixels.len();
+    let variance = at.cost / (count as f64 - COUNT as f64);
+    let covariance = at.normal.cholesky()?.inverse() * variance;
+    Some((model, covariance, (at.cost / count as f64).sqrt()))
+}
+
+/// The shape of a circle's image: `radius` in the units that `px_from_plane` maps to pixels.
+pub(super) fn shape_of_circle(px_from_plane: &Matrix2<f64>, radius: f64) -> Matrix2<f64> {
+    square_root(&(px_from_plane * px_from_plane.transpose())) * radius
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::SensorSize;
+
+    fn truth() -> Parameters {
+        Parameters::from([
+            40.37, 39.81, 17.0, 2.0, 13.0, 0.5, 190.0, 40.0, 0.02, -0.01, 0.9,
+        ])
+    }
+
+    fn offsets() -> EdgeOffsets {
+        EdgeOffsets {
+            outer: Vector2::new(0.2, -0.1),
+            inner: Vector2::new(0.05, -0.025),
+        }
+    }
+
+    fn image_of(model: Parameters, offsets: &EdgeOffsets) -> GrayImage {
+        let edges = RingModel(model).edges(offsets).unwrap();
+        let values = (0..81 * 81)
+            .map(|i| {
+                let at = Vector2::new(f64::from(i % 81), f64::from(i / 81));
+                edges.value_and_gradient(&at).0 as f32
+            })
+            .collect();
+        GrayImage::from_values(SensorSize::new(81, 81), values, 255.0).unwrap()
+    }
+
+    fn guess(polarity: Polarity) -> RingGuess {
+        RingGuess {
+            center: Vector2::new(41.0, 39.0),
+            shape: Matrix2::new(16.0, 1.0, 1.0, 14.0),
+            ratio: 0.45,
+            polarity,
+        }
+    }
+
+    #[test]
+    fn derivatives_at_the_edges_agree_with_differences() {
+        let edges = RingModel(truth()).edges(&offsets()).unwrap();
+        for angle in [0.3_f64, 1.9, 4.4] {
+            let circle = Vector2::new(angle.cos(), angle.sin());
+            for at in [
+                edges.outer.center + edges.shape * circle,
+                edges.inner.center + edges.shape * circle * 0.5,
+            ] {
+                let value = |p| {
+                    let edges = RingModel(p).edges(&offsets()).unwrap();
+                    edges.value_and_gradient(&at).0
+                };
+                let (_, gradient) = edges.value_and_gradient(&at);
+                for k in 0..COUNT {
+                    let mut step = Parameters::zeros();
+                    step[k] = 1e-5;
+                    let difference = (value(truth() + step) - value(truth() - step)) / 2e-5;
+                    // The slopes are measured in outer radii, whose own change is left out: it is
+                    // a hundredth of the light's.
+                    let tolerance = if k < RATIO { 0.2 } else { 1e-5 };
+                    assert!(
+                        (gradient[k] - difference).abs() < tolerance,
+                        "parameter {k}: {} {difference}",
+                        gradient[k]
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_image_made_by_the_model_gives_the_center_to_round_off() {
+        for polarity in [Polarity::Dark, Polarity::Bright] {
+            let mut truth = truth();
+            if polarity == Polarity::Bright {
+                truth.swap_rows(AROUND, PRINT);
+            }
+            let image = image_of(truth, &offsets());
+            let fitted = FittedRing::fit(&image, &guess(polarity), &offsets(), 1.3).unwrap();
+            // The image is stored in f32: 1e-5 of a code value.
+            assert!((fitted.pixel.u - 40.37).abs() < 1e-4);
+            assert!((fitted.pixel.v - 39.81).abs() < 1e-4);
+            assert!((fitted.ratio - 0.5).abs() < 1e-4);
+            assert!((fitted.blur_px - 0.9).abs() < 1e-3);
+            // Told of no offset, the fit lies between the two edges' middles.
+            let middle =
+                FittedRing::fit(&image, &guess(polarity), &EdgeOffsets::NONE, 1.3).unwrap();
+            let aside = middle.pixel.u - 40.37;
+            assert!(aside > 0.05 && aside < 0.2, "{aside}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_ring_of_that_kind_is_refused() {
+        let image = image_of(truth(), &EdgeOffsets::NONE);
+        let fit = |guess: &RingGuess| FittedRing::fit(&image, guess, &EdgeOffsets::NONE, 1.3);
+        assert!(fit(&guess(Polarity::Dark)).is_some());
+        assert_eq!(fit(&guess(Polarity::Bright)), None);
+        let beyond = RingGuess {
+            center: Vector2::new(70.0, 40.0),
+            ..guess(Polarity::Dark)
+        };
+        assert_eq!(fit(&beyond), None);
+        let flat = GrayImage::from_values(SensorSize::new(81, 81), vec![80.0; 81 * 81], 255.0);
+        let flat = flat.unwrap();
+        let none = FittedRing::fit(&flat, &guess(Polarity::Dark), &EdgeOffsets::NONE, 1.3);
+        assert_eq!(none, None);
+    }
+}
