@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, SMatrix, Vector2, Vector3};
 /// Fewest markers that are mapped; four would fix a homography and leave nothing to check it by.
 pub const MIN_POINTS: usize = 8;
 /// Degrees of the polynomial, highest first, and how many markers it takes.
-const DEGREES: [(usize, usize); 3] = [(4, 38), (3, 25), (2, 15)];
+const DEGREES: [(usize, usize); 5] = [(6, 56), (5, 45), (4, 34), (3, 25), (2, 15)];
 /// Singular values below this part of the largest count as zero: markers in few rows or columns
 /// leave some terms open.
 const RANK_TOLERANCE: f64 = 1e-6;
