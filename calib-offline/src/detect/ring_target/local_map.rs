@@ -3,12 +3,12 @@
 //! Grid coordinates: (column, row) as real numbers, one unit per pitch. The homography carries the
 //! perspective, the polynomial what the lens adds; neither has a meaning beyond this image.
 
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, SMatrix, Vector2, Vector3};
+use nalgebra::{DMatrix, Matrix2, Matrix3, SMatrix, Vector2, Vector3};
 
 /// Fewest markers that are mapped; four would fix a homography and leave nothing to check it by.
 pub const MIN_POINTS: usize = 8;
-/// Degrees of the polynomial, highest first, and how many markers it takes.
-const DEGREES: [(usize, usize); 5] = [(6, 56), (5, 45), (4, 34), (3, 25), (2, 15)];
+/// Degrees of the polynomial, and how many markers each takes: two for a coefficient, at least.
+const DEGREES: [(usize, usize); 5] = [(2, 15), (3, 25), (4, 38), (5, 50), (6, 60)];
 /// Singular values below this part of the largest count as zero: markers in few rows or columns
 /// leave some terms open.
 const RANK_TOLERANCE: f64 = 1e-6;
@@ -59,40 +59,24 @@ impl LocalMap {
             degree: 0,
             coefficients: Vec::new(),
         };
-        let degree = DEGREES.iter().find(|(_, need)| pairs.len() >= *need);
-        if let Some(&(degree, _)) = degree {
-            map.add_polynomial(&normalized, degree)?;
+        let ideal: Vec<Vector2<f64>> = normalized.iter().map(|p| map.ideal(&p.0)).collect();
+        let bent: Vec<Vector2<f64>> = normalized
+            .iter()
+            .zip(&ideal)
+            .map(|((_, px), ideal)| px - ideal)
+            .collect();
+        // Too low a degree leaves out what the lens does, too high a one bends wildly at the border:
+        // the one that predicts best each marker from the others.
+        let best = DEGREES
+            .iter()
+            .filter(|(_, need)| pairs.len() >= *need)
+            .filter_map(|&(degree, _)| Polynomial::fit(&ideal, &bent, degree))
+            .min_by(|a, b| a.left_out_error.total_cmp(&b.left_out_error));
+        if let Some(polynomial) = best {
+            map.degree = polynomial.degree;
+            map.coefficients = polynomial.coefficients;
         }
         Some(map)
-    }
-
-    /// Fits the polynomial to what the homography leaves of normalized pairs.
-    fn add_polynomial(
-        &mut self,
-        pairs: &[(Vector2<f64>, Vector2<f64>)],
-        degree: usize,
-    ) -> Option<()> {
-        let ideal: Vec<Vector2<f64>> = pairs.iter().map(|(grid, _)| self.ideal(grid)).collect();
-        let rows: Vec<Vec<f64>> = ideal.iter().map(|p| terms(p, degree)).collect();
-        let matrix = DMatrix::from_fn(rows.len(), rows.first()?.len(), |i, k| rows[i][k]);
-        let svd = matrix.svd(true, true);
-        let tolerance = RANK_TOLERANCE * svd.singular_values.max();
-        let solve = |axis: usize| {
-            let left = pairs
-                .iter()
-                .zip(&ideal)
-                .map(|((_, px), p)| px[axis] - p[axis]);
-            svd.solve(&DVector::from_iterator(pairs.len(), left), tolerance)
-                .ok()
-        };
-        let (along_u, along_v) = (solve(0)?, solve(1)?);
-        self.degree = degree;
-        self.coefficients = along_u
-            .iter()
-            .zip(along_v.iter())
-            .map(|(&u, &v)| Vector2::new(u, v))
-            .collect();
-        Some(())
     }
 
     /// The homography of a normalized grid point.
@@ -123,6 +107,43 @@ impl LocalMap {
                 / (2.0 * step)
         };
         Matrix2::from_columns(&[along(Vector2::x()), along(Vector2::y())])
+    }
+}
+
+/// A polynomial through values at points.
+struct Polynomial {
+    degree: usize,
+    coefficients: Vec<Vector2<f64>>,
+    /// Sum of the squared errors with which each value is predicted from all others.
+    left_out_error: f64,
+}
+
+impl Polynomial {
+    fn fit(points: &[Vector2<f64>], values: &[Vector2<f64>], degree: usize) -> Option<Self> {
+        let rows: Vec<Vec<f64>> = points.iter().map(|p| terms(p, degree)).collect();
+        let matrix = DMatrix::from_fn(rows.len(), rows.first()?.len(), |i, k| rows[i][k]);
+        let right = DMatrix::from_fn(values.len(), 2, |i, axis| values[i][axis]);
+        let svd = matrix.clone().svd(true, true);
+        let tolerance = RANK_TOLERANCE * svd.singular_values.max();
+        let solution = svd.solve(&right, tolerance).ok()?;
+        let residuals = right - matrix * &solution;
+        let basis = svd.u.as_ref()?;
+        let rank = svd.rank(tolerance);
+        // Left out, a value is missed by its residual over one less its leverage. Singular values
+        // come in descending order.
+        let left_out_error = (0..values.len())
+            .map(|i| {
+                let leverage = basis.row(i).columns(0, rank).norm_squared();
+                residuals.row(i).norm_squared() / (1.0 - leverage).max(1e-9).powi(2)
+            })
+            .sum();
+        Some(Self {
+            degree,
+            coefficients: (0..solution.nrows())
+                .map(|k| Vector2::new(solution[(k, 0)], solution[(k, 1)]))
+                .collect(),
+            left_out_error,
+        })
     }
 }
 

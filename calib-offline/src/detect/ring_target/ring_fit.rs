@@ -25,7 +25,9 @@ const BAND_PX: f64 = 8.0;
 const BAND_BLURS: f64 = 4.0;
 /// Windows with fewer pixels do not determine eleven unknowns well.
 const MIN_PIXELS: usize = 40;
-/// The window follows the ring: fitted twice, the second time around the first result.
+/// The window follows the ring: fitted a second time if the first result lies farther away than
+/// this, px, or is blurred so much that the band was too narrow.
+const SAME_WINDOW_PX: f64 = 0.5;
 const ROUNDS: usize = 2;
 const MAX_ITERATIONS: usize = 30;
 /// A step of all lengths below this many pixels ends the iteration.
@@ -123,11 +125,15 @@ impl FittedRing {
         for _ in 0..ROUNDS {
             let window = Window::around(image, &model, offsets, reach)?;
             let solved = solve(model, offsets, &window)?;
+            let moved = (solved.0.center() - model.center()).norm();
             model = solved.0;
             if (model.center() - guess.center).norm() > MAX_MOVE * guess.mean_radius_px() {
                 return None;
             }
             outcome = Some(solved);
+            if moved < SAME_WINDOW_PX && BAND_BLURS * model.0[BLUR] <= BAND_PX {
+                break;
+            }
         }
         let (model, covariance, residual_rms) = outcome?;
         let fitted = Self {
