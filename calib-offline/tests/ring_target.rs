@@ -11,6 +11,7 @@ use calib_offline::geometry::{PixelPoint, SensorSize};
 use calib_offline::simulate::{OpticsKind, RenderSettings, Scene, SceneSettings};
 use ring_shots::{Errors, Shot, located, target};
 use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
 type Truth = BTreeMap<(usize, usize), PixelPoint>;
 
@@ -74,6 +75,15 @@ fn turned(image: &GrayImage, truth: &Truth, quarters: usize) -> (GrayImage, Trut
 
 fn upright() -> Shot {
     Shot::turned(OpticsKind::Brown, [12.0, -18.0, 5.0])
+}
+
+/// The image of [`upright`] and its truth, rendered once.
+fn upright_image() -> (&'static GrayImage, &'static Truth) {
+    static SHOT: LazyLock<(GrayImage, Truth)> = LazyLock::new(|| {
+        let shot = upright();
+        (shot.image(), shot.truth())
+    });
+    (&SHOT.0, &SHOT.1)
 }
 
 #[test]
@@ -149,10 +159,9 @@ fn without_noise_the_floor_of_rendering_and_quantizing_is_left() {
 
 #[test]
 fn a_turned_image_has_the_same_labels_and_a_mirrored_one_is_refused() {
-    let shot = upright();
-    let (image, truth) = (shot.image(), shot.truth());
+    let (image, truth) = upright_image();
     for quarters in 0..4 {
-        let (image, truth) = turned(&image, &truth, quarters);
+        let (image, truth) = turned(image, truth, quarters);
         let located = located(&image).unwrap();
         assert_eq!(located.markers.len(), 63);
         assert_eq!(usize::from(located.quarter_turns), quarters);
@@ -180,18 +189,17 @@ fn any_turn_about_the_viewing_axis_is_followed() {
 
 #[test]
 fn bright_rings_on_dark_are_measured_as_well() {
-    let shot = upright();
-    let inverted = changed(&shot.image(), |_, _, value| 255.0 - value);
+    let (shot, truth) = upright_image();
+    let inverted = changed(shot, |_, _, value| 255.0 - value);
     let located = located(&inverted).unwrap();
-    let errors = Errors::of(&located, &shot.truth());
+    let errors = Errors::of(&located, truth);
     assert_eq!(errors.count, 63);
     assert!(errors.rms_px() < 0.003, "{errors:?}");
 }
 
 #[test]
 fn markers_painted_over_are_missing_and_the_others_keep_their_labels() {
-    let shot = upright();
-    let truth = shot.truth();
+    let (shot, truth) = upright_image();
     let hidden = [
         (0, 0),
         (2, 3),
@@ -202,7 +210,7 @@ fn markers_painted_over_are_missing_and_the_others_keep_their_labels() {
         (5, 2),
         (1, 7),
     ];
-    let image = changed(&shot.image(), |u, v, value| {
+    let image = changed(shot, |u, v, value| {
         let covered = hidden
             .iter()
             .any(|label| truth[label].distance_px(PixelPoint::new(u, v)) < 24.0);
@@ -210,14 +218,13 @@ fn markers_painted_over_are_missing_and_the_others_keep_their_labels() {
     });
     let located = located(&image).unwrap();
     assert_eq!(located.markers.len(), 63 - hidden.len());
-    assert_labels(&located, &truth);
+    assert_labels(&located, truth);
 }
 
 #[test]
 fn a_row_and_a_column_missing_do_not_shift_what_lies_beyond() {
-    let shot = upright();
-    let truth = shot.truth();
-    let image = changed(&shot.image(), |u, v, value| {
+    let (shot, truth) = upright_image();
+    let image = changed(shot, |u, v, value| {
         let here = PixelPoint::new(u, v);
         let covered = |(label, p): (&(usize, usize), &PixelPoint)| {
             (label.0 == 5 || label.1 == 2) && p.distance_px(here) < 24.0
@@ -229,19 +236,18 @@ fn a_row_and_a_column_missing_do_not_shift_what_lies_beyond() {
         }
     });
     let located = located(&image).unwrap();
-    assert_labels(&located, &truth);
+    assert_labels(&located, truth);
     // Row 6 and the first two columns are no neighbors of the rest, and found all the same.
     assert_eq!(located.markers.len(), 6 * 8);
 }
 
 #[test]
 fn a_cover_across_the_target_leaves_the_rest_or_a_refusal() {
-    let shot = upright();
-    let (image, truth) = (shot.image(), shot.truth());
+    let (image, truth) = upright_image();
     let covered_to = |from: PixelPoint, cover: f32| {
         let edge = from.u + 4.0;
         changed(
-            &image,
+            image,
             move |u, _, value| if u < edge { cover } else { value },
         )
     };
@@ -253,7 +259,7 @@ fn a_cover_across_the_target_leaves_the_rest_or_a_refusal() {
             "{}",
             located.markers.len()
         );
-        assert_labels(&located, &truth);
+        assert_labels(&located, truth);
         // All of the large markers behind it: nothing tells where on the target the rest lies.
         let refusal = ring_shots::located(&covered_to(truth[&(3, 6)], cover)).unwrap_err();
         let ambiguous = matches!(refusal, TargetRefusal::AmbiguousDirection { placement_count, .. } if placement_count > 1);
@@ -263,8 +269,7 @@ fn a_cover_across_the_target_leaves_the_rest_or_a_refusal() {
 
 #[test]
 fn a_target_cut_off_by_the_edge_of_the_image_is_numbered_by_its_large_markers() {
-    let shot = upright();
-    let (image, truth) = (shot.image(), shot.truth());
+    let (image, truth) = upright_image();
     let width = (truth[&(3, 7)].u + 3.0) as u32;
     let height = (truth[&(5, 4)].v + 5.0) as u32;
     let values = (0..width * height)
@@ -277,7 +282,7 @@ fn a_target_cut_off_by_the_edge_of_the_image_is_numbered_by_its_large_markers() 
         "{}",
         located.markers.len()
     );
-    assert_labels(&located, &truth);
+    assert_labels(&located, truth);
 }
 
 #[test]
@@ -320,11 +325,11 @@ fn images_without_the_target_say_why() {
 
 #[test]
 fn another_target_than_described_is_named() {
-    let image = upright().image();
+    let (image, _) = upright_image();
     let refusal = |change: &dyn Fn(&mut TargetSpec)| {
         let mut described = target();
         change(&mut described);
-        locate(&image, &described, &TargetSettings::default()).unwrap_err()
+        locate(image, &described, &TargetSettings::default()).unwrap_err()
     };
     let wrong_size = refusal(&|t| {
         t.outer_radius_mm = 2.8;

@@ -28,7 +28,7 @@ fn dataset() -> tempfile::TempDir {
     folder
 }
 
-/// id -> u_left, v_left, u_right, v_right.
+/// By id: u and v of the left camera, then of the right one.
 fn true_matches(folder: &Path) -> BTreeMap<usize, [f64; 4]> {
     let text = fs::read_to_string(folder.join("set/target/matches.csv")).unwrap();
     text.lines()

@@ -44,8 +44,8 @@ impl RingGuess {
     }
 }
 
-/// What may be rings, at most `max_count` of either polarity, in the order in which they come in the image.
-/// Stops looking through finer and coarser windows once `enough` of one polarity were found.
+/// What may be rings, at most `max_count` of either polarity, in the order in which they come in the
+/// image. Stops looking through finer and coarser windows once `enough` of one polarity were found.
 pub fn ring_candidates(image: &GrayImage, enough: usize, max_count: usize) -> Vec<RingGuess> {
     let [dark, bright] = image.quantiles([0.005, 0.995]);
     let margin = MIN_MARGIN * f64::from(bright - dark);
@@ -145,7 +145,8 @@ pub(super) fn square_root(matrix: &Matrix2<f64>) -> Matrix2<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::ring_fit::{EdgeOffsets, FittedRing};
+    use super::super::ring_fit::FittedRing;
+    use super::super::ring_model::EdgeOffsets;
     use super::*;
     use crate::geometry::SensorSize;
 

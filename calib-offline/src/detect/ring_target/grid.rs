@@ -17,6 +17,9 @@ const DIRECTION_TOLERANCE: f64 = 0.3;
 /// Cosine between two steps that count as along a row and along a column.
 const MAX_COSINE: f64 = 0.5;
 
+/// Column and row (in this order) of nodes, by their index.
+pub type Cells = BTreeMap<usize, (i64, i64)>;
+
 /// A marker as the grid sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Node {
@@ -30,9 +33,9 @@ pub struct Node {
 /// grid; by index of the node. Columns and rows turn in the image as u and v do.
 ///
 /// `radii` are the outer radii of ordinary and of direction markers in pitches.
-pub fn largest_grid(nodes: &[Node], radii: (f64, f64)) -> BTreeMap<usize, (i64, i64)> {
+pub fn largest_grid(nodes: &[Node], radii: (f64, f64)) -> Cells {
     let neighbors = neighbors(nodes, radii);
-    let mut best: BTreeMap<usize, (i64, i64)> = BTreeMap::new();
+    let mut best = Cells::new();
     let mut visited = vec![false; nodes.len()];
     let mut seeds: Vec<usize> = (0..nodes.len()).collect();
     // The best connected first; of equals, the first.
@@ -109,12 +112,7 @@ fn seed_axes(nodes: &[Node], neighbors: &[usize], seed: usize) -> Option<Matrix2
 }
 
 /// Everything that can be reached from the seed, step by step.
-fn grown(
-    nodes: &[Node],
-    neighbors: &[Vec<usize>],
-    seed: usize,
-    axes: Matrix2<f64>,
-) -> BTreeMap<usize, (i64, i64)> {
+fn grown(nodes: &[Node], neighbors: &[Vec<usize>], seed: usize, axes: Matrix2<f64>) -> Cells {
     let mut cells = BTreeMap::from([(seed, (0, 0))]);
     let mut taken = BTreeMap::from([((0, 0), seed)]);
     let mut queue = VecDeque::from([(seed, axes)]);
@@ -153,7 +151,7 @@ fn grown(
 fn local_axes(
     nodes: &[Node],
     neighbors: &[usize],
-    cells: &BTreeMap<usize, (i64, i64)>,
+    cells: &Cells,
     i: usize,
     inherited: Matrix2<f64>,
 ) -> Matrix2<f64> {

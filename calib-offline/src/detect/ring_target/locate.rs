@@ -3,11 +3,12 @@
 use super::TargetSettings;
 use super::candidates::{RingGuess, ring_candidates};
 use super::components::Polarity;
-use super::grid::{Node, largest_grid};
+use super::grid::{Cells, Node, largest_grid};
 use super::local_map::{LocalMap, MIN_POINTS};
 use super::perspective::edge_offsets;
 use super::placement::{Sized, Verdict, place};
-use super::ring_fit::{EdgeOffsets, FittedRing, shape_of_circle};
+use super::ring_fit::{FittedRing, shape_of_circle};
+use super::ring_model::EdgeOffsets;
 use super::verdict::{TargetRefusal, median};
 use crate::dataset::TargetSpec;
 use crate::dataset::image::GrayImage;
@@ -170,11 +171,9 @@ fn grid_point((col, row): (i64, i64)) -> Vector2<f64> {
     Vector2::new(col as f64, row as f64)
 }
 
-/// The cells without those that lie aside of a smooth map through all, and that map; how many there are, if they are too few.
-fn checked_cells(
-    rings: &[FittedRing],
-    mut cells: BTreeMap<usize, (i64, i64)>,
-) -> Result<(BTreeMap<usize, (i64, i64)>, LocalMap), usize> {
+/// The cells without those that lie aside of a smooth map through all, and that map. If they are
+/// too few for one: how many there are.
+fn checked_cells(rings: &[FittedRing], mut cells: Cells) -> Result<(Cells, LocalMap), usize> {
     loop {
         let pairs: Vec<_> = cells
             .iter()
@@ -210,7 +209,7 @@ fn check_blur<'a>(
 /// Which markers are large; by index of the ring. Those of neither size are left out.
 fn sizes(
     rings: &[FittedRing],
-    cells: &BTreeMap<usize, (i64, i64)>,
+    cells: &Cells,
     map: &LocalMap,
     radii: &Radii,
 ) -> Result<BTreeMap<usize, Sized>, TargetRefusal> {

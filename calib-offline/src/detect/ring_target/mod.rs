@@ -18,6 +18,7 @@ pub mod overlay;
 pub mod perspective;
 pub mod placement;
 pub mod ring_fit;
+pub mod ring_model;
 pub mod verdict;
 
 pub use join::{MarkerMatch, join_markers};

@@ -13,7 +13,8 @@
 //! No power series is cut off, so a fisheye's curve counts as it is.
 
 use super::local_map::LocalMap;
-use super::ring_fit::{EdgeOffsets, shape_of_circle};
+use super::ring_fit::shape_of_circle;
+use super::ring_model::EdgeOffsets;
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 use std::f64::consts::TAU;
 

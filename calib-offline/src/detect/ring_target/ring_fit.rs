@@ -14,10 +14,12 @@
 
 use super::candidates::{RingGuess, square_root};
 use super::components::Polarity;
+use super::ring_model::{
+    AROUND, BLUR, COUNT, Edge, EdgeOffsets, PRINT, Parameters, RATIO, RingModel,
+};
 use crate::dataset::image::GrayImage;
 use crate::geometry::PixelPoint;
-use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
-use std::f64::consts::{FRAC_2_SQRT_PI, SQRT_2};
+use nalgebra::{Matrix2, SMatrix, Vector2};
 
 /// Only pixels this near to an edge are looked at, px; a blur of a quarter of it needs more.
 const BAND_PX: f64 = 8.0;
@@ -32,8 +34,6 @@ const ROUNDS: usize = 2;
 const MAX_ITERATIONS: usize = 30;
 /// A step of all lengths below this many pixels ends the iteration.
 const STEP_TOLERANCE: f64 = 1e-5;
-/// Beyond this many standard deviations of the blur an edge is flat to 1e-6.
-const FLAT_BEYOND: f64 = 5.0;
 /// Blur is kept between these bounds while iterating, px.
 const BLUR_RANGE_PX: (f64, f64) = (0.1, 20.0);
 /// And the ratio of the radii between these.
@@ -43,32 +43,7 @@ const MAX_RESIDUAL: f64 = 0.12;
 /// The fit must stay this near to the guess, as a part of its radius.
 const MAX_MOVE: f64 = 0.4;
 
-const COUNT: usize = 11;
-type Parameters = SVector<f64, COUNT>;
 type Normal = SMatrix<f64, COUNT, COUNT>;
-const SHAPE: usize = 2;
-const RATIO: usize = 5;
-const AROUND: usize = 6;
-const PRINT: usize = 7;
-const SLOPE: usize = 8;
-const BLUR: usize = 10;
-
-/// How far the middles of the edges' ellipses lie from the image of the ring's center, px.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EdgeOffsets {
-    /// Of the outer edge.
-    pub outer: Vector2<f64>,
-    /// Of the inner edge.
-    pub inner: Vector2<f64>,
-}
-
-impl EdgeOffsets {
-    /// No perspective.
-    pub const NONE: Self = Self {
-        outer: Vector2::new(0.0, 0.0),
-        inner: Vector2::new(0.0, 0.0),
-    };
-}
 
 /// A fitted ring.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -155,12 +130,8 @@ impl FittedRing {
     }
 }
 
-/// u, v; shape (uu, uv, vv); ratio; brightness around and on the ring; slopes of the light along u
-/// and v (per outer radius); blur.
-#[derive(Debug, Clone, Copy)]
-struct RingModel(Parameters);
-
 impl RingModel {
+    /// The guess, with the mean levels between its edges and beside them.
     fn start(image: &GrayImage, guess: &RingGuess, reach: f64) -> Option<Self> {
         let inverse = guess.shape.try_inverse()?;
         let between = 1.0 - guess.ratio;
@@ -190,140 +161,6 @@ impl RingModel {
             1.0,
         ])))
     }
-
-    fn center(&self) -> Vector2<f64> {
-        Vector2::new(self.0[0], self.0[1])
-    }
-
-    fn shape(&self) -> Matrix2<f64> {
-        Matrix2::new(
-            self.0[SHAPE],
-            self.0[SHAPE + 1],
-            self.0[SHAPE + 1],
-            self.0[SHAPE + 2],
-        )
-    }
-
-    fn edges(&self, offsets: &EdgeOffsets) -> Option<RingEdges> {
-        let shape = self.shape();
-        let inverse = shape.try_inverse()?;
-        let ratio = self.0[RATIO];
-        Some(RingEdges {
-            outer: Edge {
-                center: self.center() + offsets.outer,
-                inverse,
-            },
-            inner: Edge {
-                center: self.center() + offsets.inner,
-                inverse: inverse / ratio,
-            },
-            center: self.center(),
-            shape,
-            ratio,
-            radius_px: shape.determinant().abs().sqrt(),
-            around: self.0[AROUND],
-            print: self.0[PRINT],
-            slope: Vector2::new(self.0[SLOPE], self.0[SLOPE + 1]),
-            blur: self.0[BLUR],
-        })
-    }
-}
-
-/// One elliptic edge.
-struct Edge {
-    center: Vector2<f64>,
-    /// Maps the ellipse to the unit circle.
-    inverse: Matrix2<f64>,
-}
-
-/// A point beside an edge.
-struct Beside {
-    /// Distance from the edge, positive inside, to first order, px.
-    depth: f64,
-    /// Outward normal of the edge.
-    normal: Vector2<f64>,
-    /// Where on the unit circle.
-    on_circle: Vector2<f64>,
-}
-
-impl Edge {
-    fn beside(&self, at: &Vector2<f64>) -> Beside {
-        let w = self.inverse * (at - self.center);
-        let radius = w.norm().max(1e-9);
-        let gradient = self.inverse.transpose() * w / radius;
-        let steepness = gradient.norm().max(1e-12);
-        Beside {
-            depth: (1.0 - radius) / steepness,
-            normal: gradient / steepness,
-            on_circle: w / radius,
-        }
-    }
-}
-
-/// A model, ready to be evaluated at many pixels.
-struct RingEdges {
-    outer: Edge,
-    inner: Edge,
-    center: Vector2<f64>,
-    shape: Matrix2<f64>,
-    ratio: f64,
-    radius_px: f64,
-    around: f64,
-    print: f64,
-    slope: Vector2<f64>,
-    blur: f64,
-}
-
-impl RingEdges {
-    /// The model's value at a pixel and its derivatives by the parameters, exact at the edges and
-    /// to first order beside them.
-    fn value_and_gradient(&self, at: &Vector2<f64>) -> (f64, Parameters) {
-        let (outer, inner) = (self.outer.beside(at), self.inner.beside(at));
-        let (in_outer, by_outer) = blurred_step(outer.depth, self.blur);
-        let (in_inner, by_inner) = blurred_step(inner.depth, self.blur);
-        let share = in_outer - in_inner;
-        let aside = (at - self.center) / self.radius_px;
-        let light = 1.0 + self.slope.dot(&aside);
-        let value = self.around + (self.print - self.around) * share;
-        let by_share = light * (self.print - self.around);
-        let (by_outer, by_inner) = (by_share * by_outer, -by_share * by_inner);
-        // An edge that moves outward by n . x gains as much depth.
-        let by_center = outer.normal * by_outer + inner.normal * by_inner;
-        let by_shape = |beside: &Beside, scale: f64| {
-            let (n, w) = (beside.normal * scale, beside.on_circle);
-            [n.x * w.x, n.x * w.y + n.y * w.x, n.y * w.y]
-        };
-        let (a, b) = (
-            by_shape(&outer, by_outer),
-            by_shape(&inner, by_inner * self.ratio),
-        );
-        let gradient = Parameters::from([
-            by_center.x,
-            by_center.y,
-            a[0] + b[0],
-            a[1] + b[1],
-            a[2] + b[2],
-            by_inner * inner.normal.dot(&(self.shape * inner.on_circle)),
-            light * (1.0 - share),
-            light * share,
-            aside.x * value,
-            aside.y * value,
-            -(by_outer * outer.depth + by_inner * inner.depth) / self.blur,
-        ]);
-        (light * value, gradient)
-    }
-}
-
-/// `(1 + erf(n / (s sqrt 2))) / 2` and its derivative by n.
-fn blurred_step(n: f64, blur: f64) -> (f64, f64) {
-    if n.abs() > FLAT_BEYOND * blur {
-        return (if n > 0.0 { 1.0 } else { 0.0 }, 0.0);
-    }
-    let x = n / (blur * SQRT_2);
-    (
-        f64::midpoint(1.0, libm::erf(x)),
-        0.5 * FRAC_2_SQRT_PI / (blur * SQRT_2) * (-x * x).exp(),
-    )
 }
 
 /// The pixels up to `reach` outer radii from the middle; `None` unless the ellipse itself lies in
@@ -457,21 +294,9 @@ pub(super) fn shape_of_circle(px_from_plane: &Matrix2<f64>, radius: f64) -> Matr
 
 #[cfg(test)]
 mod tests {
+    use super::super::ring_model::tests::{offsets, truth};
     use super::*;
     use crate::geometry::SensorSize;
-
-    fn truth() -> Parameters {
-        Parameters::from([
-            40.37, 39.81, 17.0, 2.0, 13.0, 0.5, 190.0, 40.0, 0.02, -0.01, 0.9,
-        ])
-    }
-
-    fn offsets() -> EdgeOffsets {
-        EdgeOffsets {
-            outer: Vector2::new(0.2, -0.1),
-            inner: Vector2::new(0.05, -0.025),
-        }
-    }
 
     fn image_of(model: Parameters, offsets: &EdgeOffsets) -> GrayImage {
         let edges = RingModel(model).edges(offsets).unwrap();
@@ -490,37 +315,6 @@ mod tests {
             shape: Matrix2::new(16.0, 1.0, 1.0, 14.0),
             ratio: 0.45,
             polarity,
-        }
-    }
-
-    #[test]
-    fn derivatives_at_the_edges_agree_with_differences() {
-        let edges = RingModel(truth()).edges(&offsets()).unwrap();
-        for angle in [0.3_f64, 1.9, 4.4] {
-            let circle = Vector2::new(angle.cos(), angle.sin());
-            for at in [
-                edges.outer.center + edges.shape * circle,
-                edges.inner.center + edges.shape * circle * 0.5,
-            ] {
-                let value = |p| {
-                    let edges = RingModel(p).edges(&offsets()).unwrap();
-                    edges.value_and_gradient(&at).0
-                };
-                let (_, gradient) = edges.value_and_gradient(&at);
-                for k in 0..COUNT {
-                    let mut step = Parameters::zeros();
-                    step[k] = 1e-5;
-                    let difference = (value(truth() + step) - value(truth() - step)) / 2e-5;
-                    // The slopes are measured in outer radii, whose own change is left out: it is
-                    // a hundredth of the light's.
-                    let tolerance = if k < RATIO { 0.2 } else { 1e-5 };
-                    assert!(
-                        (gradient[k] - difference).abs() < tolerance,
-                        "parameter {k}: {} {difference}",
-                        gradient[k]
-                    );
-                }
-            }
         }
     }
 

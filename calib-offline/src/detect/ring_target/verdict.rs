@@ -1,6 +1,7 @@
 //! What became of an image of the target: located, or refused and why.
 
 use super::locate::Located;
+use super::ring_fit::FittedRing;
 use crate::dataset::TargetSpec;
 use crate::dataset::image::GrayImage;
 use crate::detect::verdict::{EDGE_WIDTH_OF_BLUR, Refusal, why_nothing_found};
@@ -156,7 +157,7 @@ impl TargetFigures {
             partial: located.markers.len() < target.marker_count(),
             contrast_percent: 100.0 * contrast / f64::from(image.white_level),
             edge_px: EDGE_WIDTH_OF_BLUR * median(rings().map(|r| r.blur_px))?,
-            radius_px: median(rings().map(|r| r.mean_radius_px()))?,
+            radius_px: median(rings().map(FittedRing::mean_radius_px))?,
             residual_percent: 100.0 * median(rings().map(|r| r.residual_rms))? / contrast,
             sigma_px: median(rings().map(|r| r.sigma_px))?,
             perspective_px: median(
