@@ -186,7 +186,7 @@ mod tests {
         let p = Vector2::new(col - 4.0, row - 3.0) * 40.0;
         let (s, c) = turn_rad.sin_cos();
         let p = Vector2::new(c * p.x - s * p.y, s * p.x + c * p.y);
-        p / (1.0 + p.norm_squared() / (300.0 * 300.0))
+        p / (1.0 + p.norm_squared() / (500.0 * 500.0))
     }
 
     fn node(col: usize, row: usize, turn_rad: f64) -> Node {
