@@ -5,6 +5,7 @@ use crate::dataset::{CornersError, ManifestError, SufficiencyError};
 use crate::demo::DemoError;
 use crate::detect::DetectError;
 use crate::detect::overlay::OverlayError;
+use crate::detect::ring_target::TargetError;
 use crate::detect::suspicion::LabelSuspicion;
 use crate::init::InitError;
 use crate::joint::EstimateError;
@@ -30,6 +31,9 @@ pub enum Error {
     /// Pictures of the corners found.
     #[error("the overlays cannot be written")]
     Overlay(#[from] OverlayError),
+    /// The markers of the measurement target.
+    #[error("the markers of the target cannot be found")]
+    Target(#[from] TargetError),
     /// A dataset that was to be simulated.
     #[error("the dataset cannot be simulated")]
     Simulate(#[from] SimulateError),
@@ -222,6 +226,7 @@ impl Error {
             | Self::FewImages { .. }
             | Self::Labels { .. }
             | Self::Detect(DetectError::Consistency(_))
+            | Self::Target(TargetError::AllRefused { .. })
             | Self::Init(_)
             | Self::Estimate(_)
             | Self::Pack(PackError::NothingCalibrated { .. }) => 3,
@@ -229,6 +234,7 @@ impl Error {
             | Self::Corners(_)
             | Self::Detect(_)
             | Self::Overlay(_)
+            | Self::Target(_)
             | Self::Simulate(_)
             | Self::Calibration(_)
             | Self::Blob(_)
@@ -262,6 +268,7 @@ impl Error {
                 "look at the images with --overlay DIR; a board with an odd and an even number of corners cannot be turned unnoticed"
                     .to_owned(),
             ),
+            Self::Target(error) => error.remedy(),
             Self::Overlay(_) => Some("choose another folder for --overlay".to_owned()),
             Self::Simulate(_) => Some("see calib-offline simulate --help".to_owned()),
             Self::Init(_) | Self::Estimate(_) => Some(

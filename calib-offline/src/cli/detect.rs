@@ -15,7 +15,8 @@ use std::path::PathBuf;
 const EXAMPLE: &str = "\
 Example:
   calib-offline detect recordings/monday --overlay /tmp/monday
-  calib-offline calibrate recordings/monday -o results/monday";
+  calib-offline calibrate recordings/monday -o results/monday
+  calib-offline detect recordings/monday --target";
 
 const FORMATS: &str = "\
 Finds the board of dataset.toml in every image that is not excluded and writes
@@ -24,7 +25,12 @@ says why. The same corner has the same label in every image of every camera; wha
 decided is an error. The overlay shows row 0 in orange and corner (0, 0) in a red square.
 
 With --json: schema calib-offline/detect/1, images (camera, pose, file, verdict, corner_count,
-partial, quarter_turns, reason, figures), turned, pair_checks, used, corner_count.";
+partial, quarter_turns, reason, figures), turned, pair_checks, used, corner_count.
+
+With --target, the ring markers of [target] are found in the target_images instead, and written to
+DATASET/markers.csv in the same format, their centers corrected for the perspective; pose counts the
+target images. --json: schema calib-offline/detect-target/1, images (camera, pose, file, verdict,
+marker_count, partial, quarter_turns, reason, figures), used, marker_count.";
 
 /// The arguments.
 #[derive(Debug, Args)]
@@ -36,7 +42,10 @@ pub struct DetectArgs {
     /// Write each image with its corners drawn in, as PNG, to this folder
     #[arg(long, value_name = "DIR")]
     pub overlay: Option<PathBuf>,
-    /// Replace corners.csv if it exists
+    /// Find the measurement target instead of the board
+    #[arg(long)]
+    pub target: bool,
+    /// Replace corners.csv (or markers.csv) if it exists
     #[arg(long)]
     pub force: bool,
 }
@@ -296,11 +305,13 @@ mod tests {
             }],
             stage: None,
             excluded_poses: std::collections::BTreeSet::new(),
+            target: None,
         };
         let overlays = folder.path().join("overlays");
         let args = DetectArgs {
             dataset: folder.path().to_path_buf(),
             overlay: Some(overlays.clone()),
+            target: false,
             force: false,
         };
         let report = run(&args, &dataset, &Silent).unwrap();

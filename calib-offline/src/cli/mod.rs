@@ -7,6 +7,7 @@ pub mod args;
 pub mod calibrate;
 pub mod demo;
 pub mod detect;
+pub mod detect_target;
 mod failure;
 pub mod inspect;
 pub mod measure;

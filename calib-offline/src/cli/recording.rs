@@ -2,6 +2,7 @@
 
 use super::Outcome;
 use super::detect::{DetectArgs, DetectCommandError, run as run_detect};
+use super::detect_target::run as run_detect_target;
 use super::output::Console;
 use super::simulate::{SimulateArgs, SimulateSummary, run as run_simulate};
 use crate::atomic_file::{check_folder, check_place};
@@ -9,6 +10,7 @@ use crate::dataset::{Dataset, SufficiencyError, write_corners};
 use crate::error::{Error, UsageError};
 use crate::report::text::short;
 use serde::Serialize;
+use std::path::Path;
 
 /// Finds the corners of a dataset's images and writes `corners.csv`.
 ///
@@ -16,14 +18,11 @@ use serde::Serialize;
 /// [`Error`]; without a single usable image nothing is written.
 pub(super) fn detect(args: &DetectArgs, console: &Console) -> Result<Outcome, Error> {
     let dataset = Dataset::load(&args.dataset)?;
+    if args.target {
+        return detect_target(args, &dataset, console);
+    }
     let path = dataset.corners_path();
-    check_place(&path)?;
-    if path.exists() && !args.force {
-        return Err(Error::Usage(UsageError::Exists { path }));
-    }
-    if let Some(folder) = &args.overlay {
-        check_folder(folder)?;
-    }
+    check_output(args, &path)?;
     let report = run_detect(args, &dataset, console.progress()).map_err(|error| match error {
         DetectCommandError::Detect(error) => Error::Detect(error),
         DetectCommandError::Overlay(error) => Error::Overlay(error),
@@ -44,6 +43,39 @@ pub(super) fn detect(args: &DetectArgs, console: &Console) -> Result<Outcome, Er
         args.dataset.display()
     ));
     Ok(Outcome::Done)
+}
+
+/// Finds the markers of a dataset's measurement target and writes `markers.csv`.
+fn detect_target(
+    args: &DetectArgs,
+    dataset: &Dataset,
+    console: &Console,
+) -> Result<Outcome, Error> {
+    let path = dataset.markers_path();
+    check_output(args, &path)?;
+    let narrate = |text: &str| console.narrate(text);
+    let report = run_detect_target(args, dataset, console.progress(), narrate)?;
+    write_corners(&path, dataset, &report.views)?;
+    let words = format!(
+        "{}; written to {}",
+        report.object.in_words(),
+        path.display()
+    );
+    console.result(&words, &report.object);
+    Ok(Outcome::Done)
+}
+
+/// Refuses a table that exists (unless `--force`) and places that cannot be written to.
+fn check_output(args: &DetectArgs, path: &Path) -> Result<(), Error> {
+    check_place(path)?;
+    if path.exists() && !args.force {
+        let path = path.to_owned();
+        return Err(Error::Usage(UsageError::Exists { path }));
+    }
+    if let Some(folder) = &args.overlay {
+        check_folder(folder)?;
+    }
+    Ok(())
 }
 
 /// What `simulate --json` prints.

@@ -74,6 +74,7 @@ mod tests {
             }],
             stage: None,
             excluded_poses: [3].into(),
+            target: None,
         };
         let views = vec![View {
             camera_idx: 0,

@@ -2,10 +2,12 @@
 //! that cannot be meant; each names the line.
 
 mod error;
+mod images;
+mod target;
 
 pub use error::ManifestError;
+pub use target::TargetProblem;
 
-use super::image_files::{matching_files, split_pattern};
 use super::{CameraSpec, Dataset, StageSpec};
 use crate::board::BoardSpec;
 use crate::geometry::SensorSize;
@@ -43,6 +45,7 @@ struct RawManifest {
     #[serde(default)]
     camera: Vec<Spanned<RawCamera>>,
     stage: Option<RawStage>,
+    target: Option<Spanned<target::RawTarget>>,
 }
 
 #[derive(Deserialize)]
@@ -69,6 +72,7 @@ struct RawCamera {
     height: Option<Spanned<i64>>,
     images: Option<Spanned<String>>,
     image_list: Option<Spanned<Vec<String>>>,
+    target_images: Option<Spanned<String>>,
 }
 
 #[derive(Deserialize)]
@@ -125,7 +129,9 @@ impl Dataset {
             cameras,
             stage: None,
             excluded_poses: BTreeSet::new(),
+            target: None,
         };
+        dataset.target = target::target(&source, &dataset, raw.target, &raw.camera)?;
         let pose_count = (!has_corners).then(|| dataset.image_pose_count());
         if let Some(raw) = raw.stage {
             dataset.stage = Some(stage(&source, raw, pose_count)?);
@@ -309,7 +315,7 @@ fn cameras(
         };
         let width = side(&camera.width, "[[camera]] width")?;
         let height = side(&camera.height, "[[camera]] height")?;
-        let images = images(source, folder, camera, &name, has_corners)?;
+        let images = images::images(source, folder, camera, &name, has_corners)?;
         if images.is_empty() && !has_corners {
             return Err(ManifestError::NothingToRead {
                 file: file.clone(),
@@ -351,81 +357,6 @@ fn camera_name(
         });
     }
     Ok(text.clone())
-}
-
-fn images(
-    source: &Source,
-    folder: &Path,
-    camera: &RawCamera,
-    name: &str,
-    has_corners: bool,
-) -> Result<Vec<Option<PathBuf>>, ManifestError> {
-    let file = source.file.clone();
-    match (&camera.images, &camera.image_list) {
-        (None, None) => Ok(Vec::new()),
-        (Some(_), Some(list)) => Err(ManifestError::ImagesTwice {
-            file,
-            line: source.line_of(list),
-            camera: name.to_owned(),
-        }),
-        (Some(pattern), None) => {
-            let line = source.line_of(pattern);
-            let pattern = pattern.get_ref().clone();
-            let (pattern_folder, _) = split_pattern(&pattern);
-            if pattern_folder.contains(['*', '?']) {
-                return Err(ManifestError::PatternInFolder {
-                    file,
-                    line,
-                    pattern,
-                });
-            }
-            let searched = folder.join(pattern_folder);
-            let files = match matching_files(folder, &pattern) {
-                Ok(files) => files,
-                Err(_) if has_corners => Vec::new(),
-                Err(source) => {
-                    return Err(ManifestError::ImageFolder {
-                        file,
-                        line,
-                        pattern,
-                        folder: searched,
-                        source,
-                    });
-                }
-            };
-            if files.is_empty() && !has_corners {
-                return Err(ManifestError::NoMatch {
-                    file,
-                    line,
-                    pattern,
-                    folder: searched,
-                });
-            }
-            Ok(files.into_iter().map(Some).collect())
-        }
-        (None, Some(list)) => {
-            let line = source.line_of(list);
-            let camera = name.to_owned();
-            if list.get_ref().iter().all(String::is_empty) {
-                return Err(ManifestError::EmptyImageList { file, line, camera });
-            }
-            let mut images = Vec::with_capacity(list.get_ref().len());
-            for (pose, image) in list.get_ref().iter().enumerate() {
-                let path = folder.join(image);
-                if !image.is_empty() && !has_corners && !path.is_file() {
-                    return Err(ManifestError::ListedImageMissing {
-                        file,
-                        line,
-                        camera,
-                        pose,
-                        image: image.clone(),
-                    });
-                }
-                images.push((!image.is_empty()).then_some(path));
-            }
-            Ok(images)
-        }
-    }
 }
 
 /// Same number of images for every camera that has any, and no image for two views.

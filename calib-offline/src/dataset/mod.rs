@@ -8,11 +8,13 @@ pub mod manifest;
 pub mod split;
 pub mod stage;
 pub mod sufficiency;
+pub mod target;
 
 pub use corners::{CornersError, load_corners, write_corners};
 pub use identity::input_sha256;
 pub use manifest::ManifestError;
 pub use sufficiency::{SufficiencyError, check_sufficiency};
+pub use target::{TargetSpec, load_markers};
 
 use crate::board::BoardSpec;
 use crate::geometry::{PixelPoint, SensorSize};
@@ -32,6 +34,8 @@ pub struct Dataset {
     pub stage: Option<StageSpec>,
     /// Poses that the user leaves out.
     pub excluded_poses: BTreeSet<usize>,
+    /// The measurement target, if the manifest describes one. No calibration depends on it.
+    pub target: Option<TargetSpec>,
 }
 
 impl Dataset {

@@ -17,6 +17,7 @@ pub mod epipolar;
 pub mod grid;
 pub mod labelling;
 pub mod overlay;
+pub mod ring_target;
 pub mod suspicion;
 pub mod verdict;
 

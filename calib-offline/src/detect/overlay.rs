@@ -3,66 +3,113 @@
 use super::Detection;
 use super::verdict::{ImageVerdict, Outcome};
 use crate::dataset::image::GrayImage;
-use crate::dataset::{Dataset, View};
+use crate::dataset::{Corner, Dataset, View};
 use crate::progress::Progress;
 use image::{Rgb, RgbImage};
+use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 const FIRST: Rgb<u8> = Rgb([255, 60, 60]);
 const ROW_ZERO: Rgb<u8> = Rgb([255, 160, 0]);
 const OTHER: Rgb<u8> = Rgb([0, 220, 90]);
+const EDGE: Rgb<u8> = Rgb([80, 160, 255]);
 const REFUSED: Rgb<u8> = Rgb([255, 0, 0]);
 
 /// Pixels of the overlay per pixel of a small image, so that digits can be read.
 const ENLARGED_BELOW_PX: u32 = 1000;
+/// An ellipse is drawn with so many straight sides.
+const ELLIPSE_SIDES: u32 = 72;
 
 /// The image, each row of corners joined by a line: row 0 orange, the first corner a red square, a
 /// dot on every other, row and column numbers at the rows' and columns' beginnings. A refused
 /// image is framed in red.
 pub fn draw(image: &GrayImage, view: Option<&View>, verdict: &ImageVerdict) -> RgbImage {
-    let scale = if image.sensor.width.max(image.sensor.height) < ENLARGED_BELOW_PX {
-        2
-    } else {
-        1
-    };
-    let mut canvas = enlarged(image, scale);
+    let mut canvas = Canvas::new(image);
     if matches!(verdict.outcome, Outcome::Refused(_)) {
-        frame(&mut canvas);
+        canvas.frame();
     }
-    let Some(view) = view else {
-        return canvas;
-    };
-    let place = |u: f64, v: f64| {
-        let on = |x: f64| (x + 0.5) * f64::from(scale) - 0.5;
-        (on(u), on(v))
-    };
-    for pair in view.corners.windows(2) {
-        if let [a, b] = pair
-            && a.row == b.row
-        {
-            let color = if a.row == 0 { ROW_ZERO } else { OTHER };
-            let (from, to) = (place(a.pixel.u, a.pixel.v), place(b.pixel.u, b.pixel.v));
-            line(&mut canvas, from, to, color);
-        }
+    if let Some(view) = view {
+        canvas.corners(&view.corners);
     }
-    for corner in &view.corners {
-        let at = place(corner.pixel.u, corner.pixel.v);
-        let first = (corner.row, corner.col) == (0, 0);
-        let color = match (first, corner.row) {
-            (true, _) => FIRST,
-            (_, 0) => ROW_ZERO,
-            _ => OTHER,
+    canvas.image
+}
+
+/// An image to draw on, in pixels of the image below.
+pub struct Canvas {
+    image: RgbImage,
+    /// Pixels drawn per pixel of the image.
+    scale: u32,
+}
+
+impl Canvas {
+    /// The image in gray; a small one is enlarged.
+    pub fn new(image: &GrayImage) -> Self {
+        let scale = if image.sensor.width.max(image.sensor.height) < ENLARGED_BELOW_PX {
+            2
+        } else {
+            1
         };
-        square(&mut canvas, at, if first { 6 } else { 2 }, color);
-        if corner.col == 0 {
-            number(&mut canvas, (at.0 - 22.0, at.1 - 6.0), corner.row, color);
-        }
-        if corner.row == 0 {
-            number(&mut canvas, (at.0 + 4.0, at.1 - 18.0), corner.col, color);
+        Self {
+            image: enlarged(image, scale),
+            scale,
         }
     }
-    canvas
+
+    fn place(&self, u: f64, v: f64) -> (f64, f64) {
+        let on = |x: f64| (x + 0.5) * f64::from(self.scale) - 0.5;
+        (on(u), on(v))
+    }
+
+    /// A red frame: refused.
+    pub fn frame(&mut self) {
+        frame(&mut self.image);
+    }
+
+    /// Labelled corners as [`draw`] shows them; they come by row and column.
+    pub fn corners(&mut self, corners: &[Corner]) {
+        for pair in corners.windows(2) {
+            if let [a, b] = pair
+                && a.row == b.row
+            {
+                let color = if a.row == 0 { ROW_ZERO } else { OTHER };
+                let from = self.place(a.pixel.u, a.pixel.v);
+                let to = self.place(b.pixel.u, b.pixel.v);
+                line(&mut self.image, from, to, color);
+            }
+        }
+        for corner in corners {
+            let at = self.place(corner.pixel.u, corner.pixel.v);
+            let first = (corner.row, corner.col) == (0, 0);
+            let color = match (first, corner.row) {
+                (true, _) => FIRST,
+                (_, 0) => ROW_ZERO,
+                _ => OTHER,
+            };
+            square(&mut self.image, at, if first { 6 } else { 2 }, color);
+            if corner.col == 0 {
+                let beside = (at.0 - 22.0, at.1 - 6.0);
+                number(&mut self.image, beside, corner.row, color);
+            }
+            if corner.row == 0 {
+                let above = (at.0 + 4.0, at.1 - 18.0);
+                number(&mut self.image, above, corner.col, color);
+            }
+        }
+    }
+
+    /// The ellipse that `shape` makes of the unit circle, about `middle`, px.
+    pub fn ellipse(&mut self, middle: &Vector2<f64>, shape: &Matrix2<f64>) {
+        let point = |k: u32| {
+            let angle = std::f64::consts::TAU * f64::from(k) / f64::from(ELLIPSE_SIDES);
+            middle + shape * Vector2::new(angle.cos(), angle.sin())
+        };
+        for k in 0..ELLIPSE_SIDES {
+            let (from, to) = (point(k), point(k + 1));
+            let (from, to) = (self.place(from.x, from.y), self.place(to.x, to.y));
+            line(&mut self.image, from, to, EDGE);
+        }
+    }
 }
 
 /// Why overlays could not be written.
@@ -98,19 +145,35 @@ pub fn write_all(
     detection: &Detection,
     progress: &dyn Progress,
 ) -> Result<(), OverlayError> {
+    save_all(folder, &detection.images, progress, |verdict| {
+        let camera = dataset.cameras.get(verdict.camera_idx)?;
+        // An unreadable image has its verdict; there is nothing to draw on.
+        let image = GrayImage::load(&verdict.path).ok()?;
+        let of_image = |v: &&View| (v.camera_idx, v.pose) == (verdict.camera_idx, verdict.pose);
+        let view = detection.views.iter().find(of_image);
+        let name = format!("{}_{:03}.png", camera.name, verdict.pose);
+        Some((name, draw(&image, view, verdict)))
+    })
+}
+
+/// Writes what `drawn` makes of each item, under the name it gives, to the folder, which is made if
+/// need be.
+pub(super) fn save_all<T: Sync, I: Into<RgbImage>>(
+    folder: &Path,
+    items: &[T],
+    progress: &dyn Progress,
+    drawn: impl Fn(&T) -> Option<(String, I)> + Sync,
+) -> Result<(), OverlayError> {
     std::fs::create_dir_all(folder).map_err(|source| OverlayError::Folder {
         folder: folder.to_path_buf(),
         source,
     })?;
-    progress.begin("drawing overlays", detection.images.len());
-    let written = detection.images.par_iter().try_for_each(|verdict| {
-        let camera = dataset.cameras.get(verdict.camera_idx);
-        // An unreadable image has its verdict; there is nothing to draw on.
-        if let (Some(camera), Ok(image)) = (camera, GrayImage::load(&verdict.path)) {
-            let of_image = |v: &&View| (v.camera_idx, v.pose) == (verdict.camera_idx, verdict.pose);
-            let view = detection.views.iter().find(of_image);
-            let path = folder.join(format!("{}_{:03}.png", camera.name, verdict.pose));
-            draw(&image, view, verdict)
+    progress.begin("drawing overlays", items.len());
+    let written = items.par_iter().try_for_each(|item| {
+        if let Some((name, image)) = drawn(item) {
+            let path = folder.join(name);
+            let image: RgbImage = image.into();
+            image
                 .save_with_format(&path, image::ImageFormat::Png)
                 .map_err(|source| OverlayError::Write { path, source })?;
         }
@@ -119,6 +182,12 @@ pub fn write_all(
     });
     progress.end();
     written
+}
+
+impl From<Canvas> for RgbImage {
+    fn from(canvas: Canvas) -> Self {
+        canvas.image
+    }
 }
 
 fn enlarged(image: &GrayImage, scale: u32) -> RgbImage {

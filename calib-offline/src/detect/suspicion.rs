@@ -231,6 +231,7 @@ mod tests {
             cameras: vec![camera("left"), camera("right")],
             stage: None,
             excluded_poses: [].into(),
+            target: None,
         }
     }
 

@@ -148,7 +148,7 @@ pub struct ImageFigures {
 }
 
 /// An edge blurred by a Gaussian takes this many standard deviations from 10 % to 90 %.
-const EDGE_WIDTH_OF_BLUR: f64 = 2.563;
+pub(super) const EDGE_WIDTH_OF_BLUR: f64 = 2.563;
 /// Less contrast than this part of the range is refused: with 8 bits, 10 code values.
 const MIN_CONTRAST_PERCENT: f64 = 4.0;
 /// Squares blurred by more than this part of their side run into each other.

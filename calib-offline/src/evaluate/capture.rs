@@ -233,6 +233,7 @@ mod tests {
             }],
             stage: None,
             excluded_poses: [].into(),
+            target: None,
         }
     }
 

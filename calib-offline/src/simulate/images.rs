@@ -1,8 +1,7 @@
 //! The images of a simulated dataset.
 
 use super::output::{ImageDepth, SimulateError, Writer};
-use super::pattern::Pattern;
-use super::render::{PlateView, RenderSettings, Rendered};
+use super::render::{RenderSettings, Rendered};
 use super::scene::Scene;
 use super::tables::{marker_table, match_table};
 use super::target;
@@ -54,17 +53,9 @@ pub(super) fn write_target(
     let sizes = views
         .par_iter()
         .map(|&(camera_idx, pose)| {
-            let camera_from_left = scene.left_from_camera[camera_idx].inverse();
-            let view = PlateView {
-                camera: &scene.cameras[camera_idx],
-                camera_from_plate: camera_from_left * poses[pose],
-                pattern: Pattern::RingTarget,
-                bow_mm: 0.0,
-            };
-            let mut image = view.render(render);
             // Streams beyond those of the board's poses.
             let stream = scene.true_poses.len() + pose;
-            image.add_noise(render.noise_levels, scene.settings.seed, camera_idx, stream);
+            let image = scene.render_target(camera_idx, &poses[pose], render, stream);
             let name = format!("target/{}/{pose:04}.png", scene.names[camera_idx]);
             write_png(&image, depth, &folder.join(name))
         })

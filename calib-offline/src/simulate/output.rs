@@ -228,7 +228,10 @@ fn write_files(
     settings: &OutputSettings,
     writer: &mut Writer,
 ) -> Result<SimulateSummary, SimulateError> {
-    writer.text("dataset.toml", &manifest(scene, settings.images))?;
+    writer.text(
+        "dataset.toml",
+        &manifest(scene, settings.images, settings.ring_target),
+    )?;
     let mut corner_count = 0;
     if settings.corners {
         let views = scene.observe_corners();

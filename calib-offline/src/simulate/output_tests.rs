@@ -165,6 +165,10 @@ fn the_same_seed_gives_the_same_bytes_images_included() {
     assert_eq!((image.width(), image.height()), (320, 256));
     assert_eq!(image.color(), image::ColorType::L8);
     assert!(first.contains_key("target/left/0006.png"));
+    let dataset = crate::dataset::Dataset::load(&home.path().join("first")).unwrap();
+    let target = dataset.target.unwrap();
+    assert_eq!((target.rows, target.cols, target.pose_count()), (7, 9, 7));
+    assert!(target.is_direction(1, 2) && !target.is_direction(2, 1));
     let markers = lines(&first["target/truth.csv"]);
     assert!(markers.len() > 6 * 63, "{} markers", markers.len() - 1);
     let header = "id,pose,row,col,direction,x,y,z,x_left,y_left,z_left";

@@ -190,6 +190,33 @@ impl Scene {
         image
     }
 
+    /// The ring target as a camera takes it, with the sensor noise of a stream.
+    ///
+    /// `camera_idx` must exist.
+    pub fn render_target(
+        &self,
+        camera_idx: usize,
+        left_from_target: &RigidTransform,
+        settings: &RenderSettings,
+        stream: usize,
+    ) -> Rendered {
+        let camera_from_left = self.left_from_camera[camera_idx].inverse();
+        let view = PlateView {
+            camera: &self.cameras[camera_idx],
+            camera_from_plate: camera_from_left * *left_from_target,
+            pattern: Pattern::RingTarget,
+            bow_mm: 0.0,
+        };
+        let mut image = view.render(settings);
+        image.add_noise(
+            settings.noise_levels,
+            self.settings.seed,
+            camera_idx,
+            stream,
+        );
+        image
+    }
+
     /// Share of a camera's image that lies inside the hull of all its corners; of a fisheye's
     /// sensor only the image circle counts.
     pub fn hull_share(&self, camera_idx: usize) -> f64 {

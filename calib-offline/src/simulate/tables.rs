@@ -2,6 +2,9 @@
 
 use super::matches::TrueMatch;
 use super::output::OutputSettings;
+use super::pattern::{
+    DIRECTION_MARKERS, DIRECTION_RADII_MM, RING_COLS, RING_PITCH_MM, RING_RADII_MM, RING_ROWS,
+};
 use super::scene::Scene;
 use super::target::SeenMarker;
 use crate::dataset::View;
@@ -61,7 +64,7 @@ pub(super) fn marker_table(scene: &Scene, markers: &[SeenMarker]) -> String {
 }
 
 /// `dataset.toml`.
-pub(super) fn manifest(scene: &Scene, with_images: bool) -> String {
+pub(super) fn manifest(scene: &Scene, with_images: bool, with_target: bool) -> String {
     let settings = &scene.settings;
     let board = &settings.board;
     let mut text = format!(
@@ -82,6 +85,9 @@ pub(super) fn manifest(scene: &Scene, with_images: bool) -> String {
         if with_images {
             let _ = writeln!(text, "images = \"{name}/*.png\"");
         }
+        if with_target {
+            let _ = writeln!(text, "target_images = \"target/{name}/*.png\"");
+        }
     }
     // Debug writes a list of numbers as TOML does: [-40.0, -35.0].
     let _ = write!(
@@ -89,6 +95,15 @@ pub(super) fn manifest(scene: &Scene, with_images: bool) -> String {
         "\n[stage]\nangles_deg = {:?}\nplacement = {:?}\n",
         scene.pose_angles_deg, scene.pose_placements
     );
+    if with_target {
+        // A pair in a list is written as in TOML once its brackets are.
+        let direction = DIRECTION_MARKERS.map(|(row, col)| [row, col]);
+        let _ = write!(
+            text,
+            "\n[target]\nkind = \"rings\"\nrows = {RING_ROWS}\ncols = {RING_COLS}\npitch_mm = {RING_PITCH_MM:?}\nouter_radius_mm = {:?}\ndirection_outer_radius_mm = {:?}\ndirection = {direction:?}\n",
+            RING_RADII_MM.0, DIRECTION_RADII_MM.0
+        );
+    }
     text
 }
 

@@ -20,6 +20,7 @@ fn dataset() -> Dataset {
             .into(),
         stage: None,
         excluded_poses: BTreeSet::new(),
+        target: None,
     }
 }
 

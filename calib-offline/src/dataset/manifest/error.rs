@@ -1,5 +1,6 @@
 //! What can be wrong with `dataset.toml`, where, and what to do about it.
 
+use super::target::TargetProblem;
 use crate::dataset::Dataset;
 use std::path::PathBuf;
 
@@ -138,22 +139,26 @@ pub enum ManifestError {
         camera: String,
     },
     /// A pattern with `*` or `?` in its folder.
-    #[error("{}:{line}: images = \"{pattern}\": * and ? may stand in the file name only, not in its folder", file.display())]
+    #[error("{}:{line}: {key} = \"{pattern}\": * and ? may stand in the file name only, not in its folder", file.display())]
     PatternInFolder {
         /// The manifest.
         file: PathBuf,
         /// From 1.
         line: usize,
+        /// The key.
+        key: &'static str,
         /// The pattern.
         pattern: String,
     },
     /// The folder of a pattern cannot be read.
-    #[error("{}:{line}: images = \"{pattern}\": the folder {} cannot be read", file.display(), folder.display())]
+    #[error("{}:{line}: {key} = \"{pattern}\": the folder {} cannot be read", file.display(), folder.display())]
     ImageFolder {
         /// The manifest.
         file: PathBuf,
         /// From 1.
         line: usize,
+        /// The key.
+        key: &'static str,
         /// The pattern.
         pattern: String,
         /// The folder.
@@ -162,12 +167,14 @@ pub enum ManifestError {
         source: std::io::Error,
     },
     /// A pattern that means no file.
-    #[error("{}:{line}: images = \"{pattern}\" matches no file in {}", file.display(), folder.display())]
+    #[error("{}:{line}: {key} = \"{pattern}\" matches no file in {}", file.display(), folder.display())]
     NoMatch {
         /// The manifest.
         file: PathBuf,
         /// From 1.
         line: usize,
+        /// The key.
+        key: &'static str,
         /// The pattern.
         pattern: String,
         /// The folder searched.
@@ -279,6 +286,16 @@ pub enum ManifestError {
         /// The camera.
         camera: String,
     },
+    /// The measurement target.
+    #[error("{}:{line}: {problem}", file.display())]
+    Target {
+        /// The manifest.
+        file: PathBuf,
+        /// From 1.
+        line: usize,
+        /// What is wrong with it.
+        problem: TargetProblem,
+    },
 }
 
 impl ManifestError {
@@ -291,7 +308,7 @@ impl ManifestError {
             Self::Read { .. } | Self::ImageFolder { .. } => "check the path and the permissions",
             Self::NotText { .. } => "save the manifest as UTF-8 text",
             Self::Syntax { .. } => {
-                "correct the line; the keys are [dataset] exclude; [board] kind, rows, cols, square_mm; [[camera]] name, width, height, images or image_list; [stage] angles_deg, placement"
+                "correct the line; the keys are [dataset] exclude; [board] kind, rows, cols, square_mm; [[camera]] name, width, height, images or image_list, target_images; [stage] angles_deg, placement; [target] kind, rows, cols, pitch_mm, outer_radius_mm, direction_outer_radius_mm, direction"
             }
             Self::Missing { .. } => {
                 "add it; rows and cols count inner corners, width and height are pixels"
@@ -310,7 +327,7 @@ impl ManifestError {
             Self::DuplicateCamera { .. } => "give each camera its own name",
             Self::ImagesTwice { .. } => "keep one of the two",
             Self::PatternInFolder { .. } => {
-                "write one pattern per camera such as images = \"left/*.png\", or an image_list"
+                "write one pattern per camera, such as \"left/*.png\"; image_list names images one by one"
             }
             Self::NoMatch { .. } => "check the folder, the ending and upper and lower case",
             Self::ListedImageMissing { .. } => {
@@ -329,6 +346,7 @@ impl ManifestError {
             Self::NothingToRead { .. } => {
                 "add images = \"folder/*.png\" to the camera, or put corners.csv (camera,pose,row,col,u,v) into the folder"
             }
+            Self::Target { problem, .. } => problem.remedy(),
         };
         Some(text.to_owned())
     }

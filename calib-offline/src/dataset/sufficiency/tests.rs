@@ -21,6 +21,7 @@ fn dataset(names: &[&str]) -> Dataset {
             .collect(),
         stage: None,
         excluded_poses: [].into(),
+        target: None,
     }
 }
 

@@ -97,6 +97,7 @@ fn real_images_are_found_whole() {
         cameras: vec![camera("left"), camera("right")],
         stage: None,
         excluded_poses: std::collections::BTreeSet::new(),
+        target: None,
     };
     let detection = detect(&dataset).unwrap();
     assert_eq!(detection.views.len(), 26);

@@ -47,6 +47,7 @@ fn dataset(folder: &Path, board: BoardSpec, stage: bool, cameras: &[Vec<Photo>])
         cameras,
         stage: stage.then(StageSpec::default),
         excluded_poses: std::collections::BTreeSet::new(),
+        target: None,
     }
 }
 
