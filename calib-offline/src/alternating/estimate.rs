@@ -16,7 +16,8 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// How to estimate. The default is what was measured best; `..PUBLISHED` is the publication's.
+/// How to estimate. The default is what was measured best, [`AlternatingSettings::published`] the
+/// procedure as it is printed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AlternatingSettings {
     /// Spread of the networks, px; `None` chooses by corners left out.
@@ -31,6 +32,8 @@ pub struct AlternatingSettings {
     pub lattice_share: f64,
     /// When to stop.
     pub alternation: AlternationSettings,
+    /// Where to start; `None` takes the start with the lowest cost.
+    pub start: Option<StartKind>,
     /// How poses of several cameras are averaged.
     pub mean: Mean,
     /// Whether poses of a stage placement are projected onto circles, if that lowers the cost.
@@ -50,8 +53,28 @@ impl Default for AlternatingSettings {
                 step_mm: 1e-5,
                 mixing: 20,
             },
+            start: None,
             mean: Mean::L2,
             circles: true,
+        }
+    }
+}
+
+impl AlternatingSettings {
+    /// As printed: networks of the whole map with the spread of 6000 px, poses of each camera's own
+    /// pinhole averaged, sweeps without mixing. How many sweeps the publication made it does not
+    /// say; a hundred take its step below any limit one would set by it.
+    pub fn published() -> Self {
+        Self {
+            spread_px: Some(6000.0),
+            warp: false,
+            start: Some(StartKind::AveragedPinholes),
+            alternation: AlternationSettings {
+                sweeps: 100,
+                step_mm: 1e-5,
+                mixing: 0,
+            },
+            ..Self::default()
         }
     }
 }
@@ -112,6 +135,9 @@ pub enum AlternatingError {
         super::plane_map::MIN_CORNERS * 5 / 4 + 1
     )]
     FewCorners,
+    /// The start asked for does not exist.
+    #[error("there is no start of the kind asked for: no pinhole explains the corners")]
+    NoStart,
     /// No pixel sees enough boards.
     #[error(
         "no pixel looks at {} boards that lie {} % of their distance apart; the published procedure \
@@ -156,7 +182,11 @@ pub fn estimate(
 
     // (3) to (5), (31), (32)
     let mut tried = Vec::new();
-    for start in starts(observations, own, settings.mean) {
+    let wanted = |start: &Start| settings.start.is_none_or(|kind| start.kind == kind);
+    for start in starts(observations, own, settings.mean)
+        .into_iter()
+        .filter(wanted)
+    {
         let controls = controls(observations, &maps, &start.rig_from_camera, settings);
         if let Some(rms_mm) = rms_mm(&controls, &start.rig_from_board) {
             tried.push((
