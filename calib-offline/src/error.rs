@@ -11,6 +11,7 @@ use crate::init::InitError;
 use crate::joint::EstimateError;
 use crate::matches::MatchesError;
 use crate::pack::PackError;
+use crate::pinhole::PinholeError;
 use crate::report::store::CalibrationError;
 use crate::simulate::SimulateError;
 use std::path::PathBuf;
@@ -66,6 +67,9 @@ pub enum Error {
     /// No estimate.
     #[error("the estimate failed")]
     Estimate(#[from] EstimateError),
+    /// No baseline.
+    #[error("the pinhole baseline failed")]
+    Pinhole(#[from] PinholeError),
     /// A calibration that was read.
     #[error("the calibration cannot be used")]
     Calibration(#[from] CalibrationError),
@@ -218,8 +222,11 @@ impl BlobError {
     }
 }
 
+/// The exit code where the data cannot determine the answer.
+pub const DATA_UNDETERMINED: u8 = 3;
+
 impl Error {
-    /// The process's exit code: 3 where the data cannot determine the answer, else 2.
+    /// The process's exit code: [`DATA_UNDETERMINED`], else 2.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Sufficiency(_)
@@ -229,7 +236,8 @@ impl Error {
             | Self::Target(TargetError::AllRefused { .. })
             | Self::Init(_)
             | Self::Estimate(_)
-            | Self::Pack(PackError::NothingCalibrated { .. }) => 3,
+            | Self::Pinhole(_)
+            | Self::Pack(PackError::NothingCalibrated { .. }) => DATA_UNDETERMINED,
             Self::Manifest(_)
             | Self::Corners(_)
             | Self::Detect(_)
@@ -275,6 +283,10 @@ impl Error {
                 "look at the corners with calib-offline inspect, and at the images with detect \
                  --overlay; check rows, cols and the image size in dataset.toml, and record the \
                  board at more tilts and distances"
+                    .to_owned(),
+            ),
+            Self::Pinhole(_) => Some(
+                "leave the baseline out: calib-offline calibrate makes no assumption about the lens"
                     .to_owned(),
             ),
             Self::Calibration(error) => error.remedy(),

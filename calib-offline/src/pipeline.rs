@@ -4,7 +4,9 @@
 //! that cannot be what they claim; the joint estimate adjusts everything and looks at the views
 //! once more; held-out boards and the calibration itself judge it; the record says all of it.
 
+pub mod jointly;
 mod left_out;
+pub mod solution;
 mod summary;
 
 use crate::adjust::Observations;
@@ -15,15 +17,14 @@ use crate::dataset::{Dataset, View, stage};
 use crate::detect::suspicion::suspicious_labels;
 use crate::detect::verdict::Outcome;
 use crate::detect::{self, DetectSettings};
-use crate::error::{Error, UsageError};
-use crate::evaluate::half_data::first_half;
+use crate::error::{DATA_UNDETERMINED, Error, UsageError};
 use crate::evaluate::verdict::Thresholds;
-use crate::evaluate::{Folds, cross_check, estimate_folds, held_out};
-use crate::init::rig::start_rig;
-use crate::joint::estimate_screened;
+use crate::evaluate::{Folds, held_out};
 use crate::progress::Progress;
 use crate::report::Calibration;
 use clap::ValueEnum;
+use jointly::joint_solution;
+use solution::{Solved, Task};
 
 /// Which estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -138,65 +139,41 @@ pub fn calibrate_corners(
     settings: &CalibrateSettings,
     progress: &dyn Progress,
 ) -> Result<Checked, Error> {
-    if settings.method != Method::Joint {
-        return Err(Error::Usage(UsageError::NoSuchMethod {
-            method: settings.method.name(),
-        }));
-    }
     check_excluded(dataset, &corners.views)?;
     let selection = without_excluded(corners.views.clone(), &dataset.excluded_poses);
     check_sufficiency(dataset, &selection.used)
         .map_err(|error| with_refusals(dataset, error, corners.detection.as_ref()))?;
     // Labels that contradict each other are looked for only where they would explain a failure.
     let explained = |error: Error| match suspicious_labels(dataset, &selection.used) {
-        Some(suspicion) => Error::Labels {
+        Some(suspicion) if error.exit_code() == DATA_UNDETERMINED => Error::Labels {
             suspicion,
             source: Box::new(error),
         },
-        None => error,
+        _ => error,
     };
     let sensors = dataset.cameras.iter().map(|camera| camera.sensor).collect();
     let observations = Observations::new(dataset.board, sensors, &selection.used);
 
-    progress.begin("initialize", 1);
-    let start = start_rig(&observations).map_err(|error| explained(error.into()))?;
-    progress.end();
-
-    progress.begin("estimate", 1);
-    let (mut estimate, findings) =
-        estimate_screened(&observations, start).map_err(|error| explained(error.into()))?;
     let names: Vec<String> = dataset.cameras.iter().map(|c| c.name.clone()).collect();
-    let mut rig = estimate.rig(&names);
-    estimate.fill_uncertainty(&mut rig)?;
-    progress.end();
-
-    let board_peak_to_valley_mm = estimate.board_peak_to_valley_mm()?;
-
-    let wanted = if estimate.pose_count() >= 2 * crate::dataset::sufficiency::MIN_POSES {
-        settings.folds
-    } else {
-        0
-    };
     let all_poses = poses(&corners.views);
-    let placement = |pose| stage::entry(dataset, &all_poses, pose).placement;
-    let half = first_half(estimate.observations.poses.iter().copied(), placement);
-    let half = (settings.folds > 0).then_some(&half);
-    progress.begin("cross-checks", wanted);
-    let (folds, checks) = rayon::join(
-        || estimate_folds(&estimate.observations, wanted, progress),
-        || cross_check(&estimate, &rig, half),
-    );
-    progress.end();
+    let task = Task {
+        names: &names,
+        folds: settings.folds,
+        placement: &|pose| stage::entry(dataset, &all_poses, pose).placement,
+    };
+    let found = match settings.method {
+        Method::Joint => joint_solution(&observations, &task, progress),
+        Method::Alternating => Err(Error::Usage(UsageError::NoSuchMethod {
+            method: settings.method.name(),
+        })),
+    };
+    let Solved { solution, folds } = found.map_err(explained)?;
     let calibration = summary::record(&summary::Parts {
         dataset,
         corners,
         observations: &observations,
-        estimate: &estimate,
-        rig,
-        findings: &findings,
-        board_peak_to_valley_mm,
+        solution: &solution,
         held_out: &held_out(&folds),
-        checks,
         thresholds: &settings.thresholds,
     });
     Ok(Checked {

@@ -64,7 +64,7 @@ fn pairs_not_exposed_together_are_split_and_named() {
         // Two thirds of the pairs remain, and every view for its own camera.
         assert!(measured.ratio < limit, "{optics:?}: {measured:?}");
         let poses = scene.true_poses.len();
-        assert_eq!(estimate.pose_count(), poses);
+        assert_eq!(estimate.observations.different_pose_count(), poses);
         assert_eq!(
             estimate.observations.poses.len(),
             poses + scene.settings.unsynchronized_poses.len()
@@ -190,7 +190,7 @@ fn boards_seen_in_part() {
     assert_eq!(findings, []);
     let measured = measure(&scene, &estimate, true);
     assert!(measured.ratio < 1.02, "{measured:?}");
-    assert_eq!(estimate.pose_count(), 34);
+    assert_eq!(estimate.observations.different_pose_count(), 34);
 }
 
 fn find(views: &mut [View], (camera_idx, pose): (usize, usize)) -> &mut View {

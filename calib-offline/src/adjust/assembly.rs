@@ -7,11 +7,11 @@
 //! tall matrices per view for the polynomials, a band for the spline.
 
 use super::banded::BandedMatrix;
-use super::knots::KnotOrder;
 use super::model::{CameraModel, Model};
 use super::moments::FieldMoments;
 use super::observations::{Observations, ViewBasis, ViewBlock};
 use super::residual::{Linearization, linearize};
+use crate::field::knot_order::KnotOrder;
 use crate::field::spline::AxisWeights;
 use crate::geometry::so3::skew;
 use nalgebra::{DMatrix, DMatrixView, Dyn, Vector2, Vector3};
@@ -272,7 +272,7 @@ pub fn spline_sums(
     }
     let border_len = begins.len();
     let rows = 2 * order.knot_count();
-    let mut band = BandedMatrix::zeros(rows, order.half_bandwidth());
+    let mut band = BandedMatrix::zeros(rows, order.half_bandwidth(2));
     let mut border = vec![0.0; rows * border_len];
     // The part of a row that every view of the camera shares, for each of the two components.
     let mut shared = [vec![0.0; shared_len], vec![0.0; shared_len]];

@@ -1,8 +1,8 @@
 //! Everything that an adjustment moves, and how a step moves it.
 
-use super::knots::KnotOrder;
 use super::observations::{Observations, ViewBasis};
 use crate::board::BoardShape;
+use crate::field::knot_order::KnotOrder;
 use crate::field::structured::StructuredBasis;
 use crate::field::{RayField, SmoothMap};
 use crate::geometry::RigidTransform;

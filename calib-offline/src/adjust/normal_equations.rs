@@ -10,6 +10,7 @@
 use super::assembly::{self, Components, EXTRINSICS, ViewSums, predict};
 use super::banded::BandedMatrix;
 use super::cholesky::{BandedCholesky, gram};
+use super::knots::thin_plate;
 use super::model::{CameraModel, Layout, Model, Step};
 use super::observations::{Observations, ViewBasis};
 use super::spline_block::{BorderColumns, EliminatedSpline, SplineBlock};
@@ -45,7 +46,7 @@ impl CameraPriors {
     pub fn free(camera: &CameraModel) -> Self {
         let thin_plate = camera
             .knot_order()
-            .map(|order| Arc::new(order.thin_plate()));
+            .map(|order| Arc::new(thin_plate(&order)));
         Self::with_energy(camera, thin_plate)
     }
 

@@ -5,7 +5,7 @@ use crate::board::BoardSpec;
 use crate::dataset::View;
 use crate::field::polynomial::{self, AxisValues, Polynomial};
 use crate::field::spline::AxisWeights;
-use crate::field::{BaseLens, FieldSample, RayField};
+use crate::field::{BaseLens, CoverageMask, FieldSample, RayField};
 use crate::geometry::{PixelPoint, SensorSize};
 use nalgebra::{DMatrix, Matrix2, Vector2, Vector3};
 use std::sync::Arc;
@@ -91,9 +91,39 @@ impl Observations {
         }
     }
 
+    /// Number of different poses; one that was split counts once.
+    pub fn different_pose_count(&self) -> usize {
+        let repeated = self.poses.windows(2).filter(|w| w[0] == w[1]).count();
+        self.poses.len() - repeated
+    }
+
+    /// Names for cameras that need none: their numbers.
+    pub fn numbered_cameras(&self) -> Vec<String> {
+        (0..self.sensors.len()).map(|k| k.to_string()).collect()
+    }
+
     /// Number of corners in all views.
     pub fn corner_count(&self) -> usize {
         self.views.iter().map(|view| view.corners.len()).sum()
+    }
+
+    /// The calibrated area of a camera: that of its corners that count, which `counts` is asked of
+    /// by index of the view and of the corner in it.
+    pub fn coverage(
+        &self,
+        camera_idx: usize,
+        counts: impl Fn(usize, usize) -> bool,
+    ) -> CoverageMask {
+        let views = self.views.iter().enumerate();
+        let corners = views
+            .filter(|(_, view)| view.camera_idx == camera_idx)
+            .flat_map(|(view_idx, view)| {
+                let corners = view.corners.iter().enumerate();
+                corners.map(move |(corner_idx, corner)| (view_idx, corner_idx, corner.pixel))
+            })
+            .filter(|(view_idx, corner_idx, _)| counts(*view_idx, *corner_idx))
+            .map(|(_, _, pixel)| pixel);
+        CoverageMask::from_corners(self.sensors[camera_idx], corners)
     }
 
     /// The views of some poses only, with poses renumbered.
@@ -213,7 +243,8 @@ impl ViewBasis {
         &self.polynomial.axes[corner_idx]
     }
 
-    /// The field's numbers at a corner.
+    /// The field's numbers at a corner. An adjustment has no spline in its offsets, and none is
+    /// looked at.
     pub fn sample(&self, field: &RayField, corner_idx: usize) -> FieldSample {
         let fixed = &*self.polynomial;
         let (mut s, mut ds) = fixed.base[corner_idx];

@@ -98,7 +98,7 @@ fn measure_fold(
     offered: &Observations,
     settings: &PackSettings,
 ) -> Result<FoldErrors, Error> {
-    let packed = pack_nearest(&fold.rig(), settings)?;
+    let packed = pack_nearest(&fold.rig, settings)?;
     let bytes = AlignedBytes::from(packed.bytes.as_slice());
     let blob = RayBlob::open(&bytes).map_err(DemoError::Open)?;
     let recorded = offered.with_poses(|pose| fold.unseen.poses.contains(&pose));

@@ -122,9 +122,9 @@ pub fn first_half(
 /// # Errors
 /// Why there are none.
 pub fn estimate_halves(estimate: &Estimate, first: &BTreeSet<usize>) -> Result<Halves, Skipped> {
-    if estimate.pose_count() < MIN_POSES {
+    if estimate.observations.different_pose_count() < MIN_POSES {
         return Err(Skipped::TooFewPoses {
-            have: estimate.pose_count(),
+            have: estimate.observations.different_pose_count(),
             need: MIN_POSES,
         });
     }
@@ -164,7 +164,7 @@ impl Halves {
             return Err(Skipped::NoCommonPoints);
         }
         Ok(HalfData {
-            poses: [0, 1].map(|k| self.estimates[k].pose_count()),
+            poses: [0, 1].map(|k| self.estimates[k].observations.different_pose_count()),
             points,
             difference_rms_mm,
             predicted_rms_mm,

@@ -8,24 +8,34 @@ use super::measured_board::MeasuredBoard;
 use super::resection::residuals_with_free_pose;
 use crate::adjust::Observations;
 use crate::adjust::observations::ViewBlock;
+use crate::board::BoardShape;
 use crate::dataset::Corner;
 use crate::field::Rig;
 use crate::geometry::PixelPoint;
-use crate::init::InitError;
-use crate::init::rig::start_rig;
-use crate::joint::{Estimate, EstimateError, estimate};
 use crate::matches::source::{PointSource, RigSource};
 use crate::matches::{Number, Sighting, Status};
 use crate::progress::Progress;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::fmt::Display;
+
+/// What a method makes of some poses, as far as others are judged by it.
+#[derive(Debug, Clone)]
+pub struct Estimated {
+    /// The cameras.
+    pub rig: Rig,
+    /// Out-of-plane shape of the board.
+    pub board_shape: BoardShape,
+}
 
 /// An estimate from all poses but those of one fold.
 #[derive(Debug, Clone)]
 pub struct Fold {
-    /// The estimate.
-    pub estimate: Estimate,
+    /// The rig that the other poses gave.
+    pub rig: Rig,
+    /// The board's shape that they gave.
+    pub board_shape: BoardShape,
     /// The poses left out.
     pub unseen: Observations,
 }
@@ -46,15 +56,6 @@ pub struct FailedFold {
     pub fold: usize,
     /// Why, in words.
     pub reason: String,
-}
-
-/// Why a fold's training poses gave no estimate.
-#[derive(Debug, thiserror::Error)]
-enum FoldError {
-    #[error(transparent)]
-    Start(#[from] InitError),
-    #[error(transparent)]
-    Estimate(#[from] EstimateError),
 }
 
 /// Errors on held-out boards, all folds together.
@@ -106,19 +107,35 @@ pub fn fold_of(pose_idx: usize, folds: usize) -> usize {
     pose_idx % folds.max(1)
 }
 
-/// Estimates each fold from the other folds' poses.
+/// Estimates each fold from the other folds' poses by any method.
 ///
 /// Cost: `folds` estimates, run in parallel with ordered results.
-pub fn estimate_folds(observations: &Observations, folds: usize, progress: &dyn Progress) -> Folds {
+pub fn estimate_folds<E: Display>(
+    observations: &Observations,
+    folds: usize,
+    estimate: &(dyn Fn(&Observations) -> Result<Estimated, E> + Sync),
+    progress: &dyn Progress,
+) -> Folds {
     let results: Vec<Result<Fold, FailedFold>> = (0..folds)
         .into_par_iter()
         .map(|fold| {
-            let result = estimate_fold(observations, folds, fold);
+            let in_fold = |pose: usize| {
+                let idx = observations.poses.binary_search(&pose);
+                idx.is_ok_and(|idx| fold_of(idx, folds) == fold)
+            };
+            let result = estimate(&observations.with_poses(|pose| !in_fold(pose)));
             progress.advance();
-            result.map_err(|error| FailedFold {
-                fold,
-                reason: error.to_string(),
-            })
+            match result {
+                Ok(Estimated { rig, board_shape }) => Ok(Fold {
+                    rig,
+                    board_shape,
+                    unseen: observations.with_poses(in_fold),
+                }),
+                Err(error) => Err(FailedFold {
+                    fold,
+                    reason: error.to_string(),
+                }),
+            }
         })
         .collect();
     let mut all = Folds::default();
@@ -131,25 +148,6 @@ pub fn estimate_folds(observations: &Observations, folds: usize, progress: &dyn 
     all
 }
 
-fn estimate_fold(
-    observations: &Observations,
-    folds: usize,
-    fold: usize,
-) -> Result<Fold, FoldError> {
-    let in_fold = |pose: usize| {
-        observations
-            .poses
-            .binary_search(&pose)
-            .is_ok_and(|idx| fold_of(idx, folds) == fold)
-    };
-    let training = observations.with_poses(|pose| !in_fold(pose));
-    let start = start_rig(&training)?;
-    Ok(Fold {
-        estimate: estimate(&start.observations, &start)?,
-        unseen: observations.with_poses(in_fold),
-    })
-}
-
 /// Judges the folds, in f64.
 pub fn held_out(folds: &Folds) -> HeldOut {
     let mut all = HeldOut {
@@ -158,10 +156,9 @@ pub fn held_out(folds: &Folds) -> HeldOut {
         ..HeldOut::default()
     };
     for fold in &folds.estimated {
-        let rig = fold.rig();
-        fold.add_residuals(&rig, &mut all);
+        fold.add_residuals(&mut all);
         // Without a frame there is always a source.
-        if let Some(source) = RigSource::new(&rig, None) {
+        if let Some(source) = RigSource::new(&fold.rig, None) {
             all.boards.add(measure_boards(&source, &fold.unseen));
         }
     }
@@ -169,22 +166,14 @@ pub fn held_out(folds: &Folds) -> HeldOut {
 }
 
 impl Fold {
-    /// The rig that this fold's training poses gave; its cameras are named by number.
-    pub fn rig(&self) -> Rig {
-        let names: Vec<String> = (0..self.unseen.sensors.len())
-            .map(|k| k.to_string())
-            .collect();
-        self.estimate.rig(&names)
-    }
-
     /// Residuals of the corners in the calibrated area; the others are counted.
-    fn add_residuals(&self, rig: &Rig, result: &mut HeldOut) {
+    fn add_residuals(&self, result: &mut HeldOut) {
         for view in &self.unseen.views {
-            let corners: Vec<Corner> = covered(rig, view, &mut result.outside_count);
+            let corners: Vec<Corner> = covered(&self.rig, view, &mut result.outside_count);
             let residuals = residuals_with_free_pose(
-                &rig.cameras[view.camera_idx].field,
+                &self.rig.cameras[view.camera_idx].field,
                 &self.unseen.board,
-                &self.estimate.model.board_shape,
+                &self.board_shape,
                 &corners,
             );
             result

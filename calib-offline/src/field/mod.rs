@@ -2,6 +2,8 @@
 
 pub mod base_lens;
 pub mod coverage;
+pub mod from_rays;
+pub mod knot_order;
 pub mod lens_fit;
 pub mod polynomial;
 pub mod projection;

@@ -3,6 +3,7 @@
 //! Lengths are millimeters, angles radians. `a_from_b` maps coordinates in frame b to coordinates
 //! in frame a, so products chain by eye: `left_from_datum * datum_from_board`.
 
+pub mod banded;
 pub mod hull;
 pub mod pixel;
 pub mod placement;

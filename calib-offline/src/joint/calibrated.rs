@@ -31,12 +31,6 @@ impl Estimate {
         }
     }
 
-    /// Number of different poses that went in; one that was split counts once.
-    pub fn pose_count(&self) -> usize {
-        let poses = &self.observations.poses;
-        poses.len() - poses.windows(2).filter(|w| w[0] == w[1]).count()
-    }
-
     /// Per pose of the observations, in the rig's frame.
     pub fn rig_from_board(&self) -> Vec<RigidTransform> {
         let datum = self.datum_from_first_camera();
@@ -70,19 +64,8 @@ impl Estimate {
     }
 
     fn coverage(&self, camera_idx: usize) -> CoverageMask {
-        let corners = self
-            .observations
-            .views
-            .iter()
-            .zip(&self.robust_weights)
-            .filter(|(view, _)| view.camera_idx == camera_idx)
-            .flat_map(|(view, weights)| {
-                view.corners
-                    .iter()
-                    .zip(weights)
-                    .filter(|(_, weight)| **weight > 0.0)
-                    .map(|(corner, _)| corner.pixel)
-            });
-        CoverageMask::from_corners(self.model.cameras[camera_idx].field.sensor, corners)
+        self.observations.coverage(camera_idx, |view, corner| {
+            self.robust_weights[view][corner] > 0.0
+        })
     }
 }

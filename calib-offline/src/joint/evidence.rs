@@ -2,10 +2,11 @@
 
 use super::fit::Fit;
 use crate::adjust::banded::BandedMatrix;
-use crate::adjust::knots::KnotOrder;
+use crate::adjust::knots::{thin_plate, thin_plate_ln_determinant};
 use crate::adjust::model::Layout;
 use crate::adjust::normal_equations::{CameraPriors, Priors, Reduced};
 use crate::adjust::{CameraModel, Model};
+use crate::field::knot_order::KnotOrder;
 use nalgebra::DVector;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -74,12 +75,12 @@ struct SplineEnergy {
 
 impl SplineEnergy {
     fn new(order: KnotOrder) -> Self {
-        let thin_plate = order.thin_plate();
+        let thin_plate = thin_plate(&order);
         let probes = probes(thin_plate.size());
         Self {
             weighted: probes.iter().map(|probe| thin_plate.times(probe)).collect(),
             probes,
-            ln_determinant: order.thin_plate_ln_determinant(),
+            ln_determinant: thin_plate_ln_determinant(&order),
             thin_plate: Arc::new(thin_plate),
             order,
         }

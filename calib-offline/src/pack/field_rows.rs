@@ -196,7 +196,11 @@ mod tests {
 
     #[test]
     fn rows_give_the_numbers_of_single_samples() {
-        for camera in [bumpy_camera(), port_camera()] {
+        // An offset with a spline, as a field from sampled rays has it.
+        let mut splines = port_camera();
+        let spline = bumpy_camera().field.direction.spline;
+        splines.field.offset.as_mut().unwrap().spline = spline;
+        for camera in [bumpy_camera(), port_camera(), splines] {
             let sensor = camera.field.sensor;
             let columns: Vec<f64> = (0..9)
                 .map(|k| f64::from(sensor.width) * f64::from(k) / 8.0 - 0.5)

@@ -1,12 +1,13 @@
 //! One control grid per camera: the field resampled by least squares.
 
 use super::PackError;
-use super::banded::BandedSystem;
 use super::field_rows::FieldRows;
 use crate::field::CalibratedCamera;
-use crate::field::spline::{AxisWeights, SplineGrid};
+use crate::field::knot_order::KnotOrder;
+use crate::field::spline::SplineGrid;
 use crate::field::transport::{self, MAX_HALF_ANGLE_LENGTH};
 use crate::geometry::PixelPoint;
+use crate::geometry::banded::BandedSystem;
 use nalgebra::{Matrix3, Vector2};
 use ray_runtime::format::{self, Encoding};
 
@@ -54,9 +55,12 @@ pub fn fit(camera: &CalibratedCamera, cells: [u32; 2]) -> Result<ControlGrid, Pa
         cells_v: cells[1] as usize,
     };
     let lattice = Lattice::new(camera, &grid);
-    let order = KnotOrder::new(&grid);
-    let mut system = BandedSystem::new(grid.knot_count(), order.half_bandwidth());
-    add_thin_plate(&mut system, &grid, &order);
+    let order = KnotOrder::new(grid);
+    let mut system = BandedSystem::new(grid.knot_count(), order.half_bandwidth(1));
+    for stencil in order.thin_plate() {
+        let weight = stencil.weight * THIN_PLATE_WEIGHT;
+        system.add_square(stencil.terms(), [0.0; 4], weight);
+    }
 
     let turn = RoundingTurn::new(&camera.rig_from_camera.rotation);
     let rows = FieldRows::new(field, lattice.u_px.clone());
@@ -84,7 +88,7 @@ pub fn fit(camera: &CalibratedCamera, cells: [u32; 2]) -> Result<ControlGrid, Pa
                 let m = sample.m_mm / (1.0 + length_squared / 4.0);
                 let s = turn.applied(&sample.s);
                 let value = [s.x, s.y, m.x, m.y];
-                let terms = knots_that_matter(&order, weights_u, &weights_v);
+                let terms = order.around(weights_u, &weights_v);
                 system.add_square(&terms, value, weight);
             }
         }
@@ -93,9 +97,8 @@ pub fn fit(camera: &CalibratedCamera, cells: [u32; 2]) -> Result<ControlGrid, Pa
         camera: camera.name.clone(),
         cells,
     })?;
-    let knots = (0..grid.knots_v())
-        .flat_map(|j| (0..grid.knots_u()).map(move |i| (i, j)))
-        .map(|(i, j)| solution[order.index(i, j)])
+    let knots = (0..grid.knot_count())
+        .map(|number| solution[order.from_row_major(number)])
         .collect();
     Ok(ControlGrid {
         cells,
@@ -187,77 +190,4 @@ fn dilated(flags: &[bool], length: usize, lines: usize, stride: usize, reach: us
         }
     }
     result
-}
-
-/// Numbers the knots along the shorter axis first, which keeps the band narrow.
-struct KnotOrder {
-    step_u: usize,
-    step_v: usize,
-}
-
-impl KnotOrder {
-    fn new(grid: &SplineGrid) -> Self {
-        if grid.knots_u() <= grid.knots_v() {
-            Self {
-                step_u: 1,
-                step_v: grid.knots_u(),
-            }
-        } else {
-            Self {
-                step_u: grid.knots_v(),
-                step_v: 1,
-            }
-        }
-    }
-
-    fn index(&self, i: usize, j: usize) -> usize {
-        i * self.step_u + j * self.step_v
-    }
-
-    fn half_bandwidth(&self) -> usize {
-        3 * (self.step_u + self.step_v)
-    }
-}
-
-/// The 16 knots around a point and their weights.
-fn knots_that_matter(
-    order: &KnotOrder,
-    weights_u: &AxisWeights,
-    weights_v: &AxisWeights,
-) -> [(usize, f64); 16] {
-    std::array::from_fn(|k| {
-        let (i, j) = (k % 4, k / 4);
-        (
-            order.index(weights_u.first + i, weights_v.first + j),
-            weights_u.value[i] * weights_v.value[j],
-        )
-    })
-}
-
-/// The discrete thin-plate energy of the knots: squared second differences along u and v, twice
-/// the squared mixed ones.
-fn add_thin_plate(system: &mut BandedSystem, grid: &SplineGrid, order: &KnotOrder) {
-    let (knots_u, knots_v) = (grid.knots_u(), grid.knots_v());
-    for j in 0..knots_v {
-        for i in 0..knots_u {
-            let at = |di: usize, dj: usize| order.index(i + di, j + dj);
-            if i + 2 < knots_u {
-                let terms = [(at(0, 0), 1.0), (at(1, 0), -2.0), (at(2, 0), 1.0)];
-                system.add_square(&terms, [0.0; 4], THIN_PLATE_WEIGHT);
-            }
-            if j + 2 < knots_v {
-                let terms = [(at(0, 0), 1.0), (at(0, 1), -2.0), (at(0, 2), 1.0)];
-                system.add_square(&terms, [0.0; 4], THIN_PLATE_WEIGHT);
-            }
-            if i + 1 < knots_u && j + 1 < knots_v {
-                let terms = [
-                    (at(0, 0), 1.0),
-                    (at(1, 0), -1.0),
-                    (at(0, 1), -1.0),
-                    (at(1, 1), 1.0),
-                ];
-                system.add_square(&terms, [0.0; 4], 2.0 * THIN_PLATE_WEIGHT);
-            }
-        }
-    }
 }

@@ -8,7 +8,6 @@
 //! compared with the calibration's (`sigma_error`).
 
 mod aligned_bytes;
-mod banded;
 mod budget;
 mod encode;
 mod field_rows;

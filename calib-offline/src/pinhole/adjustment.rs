@@ -68,6 +68,8 @@ pub struct Outcome {
     pub rms_px: f64,
     /// Corners used; with robust weights, those of weight zero are not.
     pub corner_count: usize,
+    /// Which, per view and corner.
+    pub is_used: Vec<Vec<bool>>,
     /// Linearizations.
     pub iterations: usize,
     /// Why it ended.
@@ -205,11 +207,17 @@ fn summarize(
     run: &Run,
 ) -> Outcome {
     let (mut cost_px2, mut squared_px2, mut weighted, mut count) = (0.0, 0.0, 0.0, 0);
+    let mut is_used = Vec::with_capacity(weights.len());
     for ((residuals, weights), view) in residuals(&state, observations)
         .iter()
         .zip(weights)
         .zip(&observations.views)
     {
+        let used = residuals.iter().zip(weights);
+        is_used.push(
+            used.map(|(r, weight)| r.is_some() && *weight > 0.0)
+                .collect(),
+        );
         for ((residual, weight), corner) in residuals.iter().zip(weights).zip(&view.corners) {
             let Some(squared) = residual.filter(|_| *weight > 0.0).map(|r| r.norm_squared()) else {
                 continue;
@@ -245,6 +253,7 @@ fn summarize(
         cost_px2,
         rms_px: (squared_px2 / count.max(1) as f64).sqrt(),
         corner_count: count,
+        is_used,
         iterations: run.iterations,
         stop: run.stop,
         deviations,

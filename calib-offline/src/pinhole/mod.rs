@@ -11,6 +11,7 @@ pub mod adjustment;
 mod arrowhead;
 pub mod brown;
 pub mod calibrate_camera;
+pub mod field_rig;
 pub mod homography;
 mod reprojection;
 pub mod rig;
@@ -22,6 +23,7 @@ pub mod zhang;
 pub use adjustment::{CameraDeviations, Loss, Settings};
 pub use brown::BrownCamera;
 pub use calibrate_camera::{CameraFit, StartKind, StartTried, calibrate_camera};
+pub use field_rig::FieldRig;
 pub use homography::PixelHomography;
 pub use rig::PinholeRig;
 pub use stereo::{Refine, RigSettings, calibrate_rig};
@@ -60,6 +62,18 @@ pub enum PinholeError {
         /// Number of the pose.
         pose: usize,
     },
+    /// The calibrated area of a camera has no ray: the distortion folds back before it.
+    #[error(
+        "camera {camera_idx}: the distortion found folds back before the corners that were seen; no \
+         pinhole explains this lens"
+    )]
+    NoRays {
+        /// Index of the camera.
+        camera_idx: usize,
+    },
+    /// No board was placed, so there is no frame for the rig.
+    #[error("no board was placed")]
+    NoPose,
     /// The observations have no such camera.
     #[error("there is no camera {camera_idx}, there are {have}")]
     NoSuchCamera {

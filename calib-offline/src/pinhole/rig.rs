@@ -24,6 +24,8 @@ pub struct PinholeRig {
     pub rms_px: f64,
     /// Corners used, all cameras together.
     pub corner_count: usize,
+    /// Which, per view and corner of the observations.
+    pub is_used: Vec<Vec<bool>>,
     /// Linearizations of the adjustment of all together.
     pub iterations: usize,
     /// Why it ended.

@@ -6,6 +6,7 @@ use super::brown::BrownCamera;
 use super::calibrate_camera::{CameraFit, calibrate_camera};
 use super::rig::PinholeRig;
 use crate::adjust::Observations;
+use crate::adjust::observations::ViewBlock;
 use crate::geometry::{RigidTransform, so3};
 use crate::init::InitError;
 use nalgebra::Vector3;
@@ -79,6 +80,15 @@ pub fn join(
         Refine::Everything => Free::Everything,
     };
     let outcome = minimize(state, &used, free, &settings.adjustment)?;
+    let mut of_used = outcome.is_used.into_iter();
+    let is_used = observations
+        .views
+        .iter()
+        .map(|view| {
+            let own = is_usable(&fits, view).then(|| of_used.next()).flatten();
+            own.unwrap_or_else(|| vec![false; view.corners.len()])
+        })
+        .collect();
     Ok(PinholeRig {
         cameras: outcome.state.cameras,
         camera_from_first: outcome.state.camera_from_first,
@@ -87,6 +97,7 @@ pub fn join(
         cost_px2: outcome.cost_px2,
         rms_px: outcome.rms_px,
         corner_count: outcome.corner_count,
+        is_used,
         iterations: outcome.iterations,
         stop: outcome.stop,
         deviations: outcome.deviations,
@@ -96,9 +107,12 @@ pub fn join(
 /// The views that placed their board; the others could not have in the rig either.
 fn usable_views(observations: &Observations, fits: &[CameraFit]) -> Observations {
     let mut used = observations.clone();
-    used.views
-        .retain(|view| fits[view.camera_idx].camera_from_board[view.pose_idx].is_some());
+    used.views.retain(|view| is_usable(fits, view));
     used
+}
+
+fn is_usable(fits: &[CameraFit], view: &ViewBlock) -> bool {
+    fits[view.camera_idx].camera_from_board[view.pose_idx].is_some()
 }
 
 struct Placed {

@@ -4,7 +4,9 @@ use super::adjustment::{Loss, Settings};
 use super::{PinholeError, PinholeRig, Refine, RigSettings};
 use super::{calibrate_camera, calibrate_rig};
 use crate::adjust::{Observations, StopReason};
-use crate::geometry::so3;
+use crate::board::BoardShape;
+use crate::evaluate::reprojection::residuals;
+use crate::geometry::{RigidTransform, so3};
 use crate::init::InitError;
 use crate::simulate::optics::{Distortion, Lens};
 use crate::simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
@@ -211,4 +213,89 @@ fn a_third_camera_is_placed_through_the_second() {
     }
     let rig = calibrate_rig(&seen, &RigSettings::default()).unwrap();
     assert!(rig.camera_from_first[2].translation_mm.norm() < 1e-5);
+}
+
+#[test]
+fn as_ray_fields_the_cameras_measure_the_same_points() {
+    let scene = scene(|_| ());
+    let mut seen = observations(&scene);
+    // The first pose is placed by nobody: the rig's frame is the second.
+    for view in seen.views.iter_mut().filter(|view| view.pose_idx == 0) {
+        view.corners.truncate(5);
+    }
+    let pinhole = calibrate_rig(&seen, &RigSettings::default()).unwrap();
+    let found = pinhole.rig(&seen.numbered_cameras(), &seen).unwrap();
+    assert!(found.worst_error_px < 1e-5, "{}", found.worst_error_px);
+    assert_eq!(found.rig.datum_pose, 1);
+    assert!(found.rig_from_board[0].is_none());
+    let rig_from_first = pinhole.first_from_board[1].unwrap().inverse();
+    let mut compared = 0;
+    for view in seen.views.iter().filter(|v| v.camera_idx == 0) {
+        for corner in &view.corners {
+            let other = seen
+                .views
+                .iter()
+                .find(|other| (other.camera_idx, other.pose_idx) == (1, view.pose_idx));
+            let label = (corner.row, corner.col);
+            let other = other.and_then(|o| o.corners.iter().find(|c| (c.row, c.col) == label));
+            let Some(other) = other else { continue };
+            let sightings = [(0, corner.pixel), (1, other.pixel)];
+            let Ok(point) = found.rig.triangulate(&sightings) else {
+                // Corners that took no part may lie outside.
+                assert_eq!(view.pose_idx, 0);
+                continue;
+            };
+            let exact = rig_from_first.point(&pinhole.triangulate(&sightings).unwrap().point_mm);
+            // 1e-5 px at 350 mm and 900 px of focal length are 4e-6 mm, a few times that in depth.
+            assert!((point.point_mm - exact).norm() < 2e-5);
+            compared += 1;
+        }
+    }
+    assert!(compared > 300, "{compared}");
+
+    // The residuals of the fields are the adjustment's, to first order in residuals of 0.05 px.
+    let poses: Vec<_> = found
+        .rig_from_board
+        .iter()
+        .map(|p| p.unwrap_or_else(RigidTransform::identity))
+        .collect();
+    let residuals = residuals(&found.rig, &poses, &BoardShape::default(), &seen);
+    let used = residuals
+        .iter()
+        .flatten()
+        .zip(pinhole.is_used.iter().flatten());
+    let squared: Vec<f64> = used
+        .filter(|(_, used)| **used)
+        .map(|(residual, _)| residual.unwrap().norm_squared())
+        .collect();
+    assert_eq!(squared.len(), pinhole.corner_count);
+    let rms_px = (squared.iter().sum::<f64>() / squared.len() as f64).sqrt();
+    assert!(
+        (rms_px / pinhole.rms_px - 1.0).abs() < 1e-3,
+        "{rms_px} {}",
+        pinhole.rms_px
+    );
+}
+
+#[test]
+fn beyond_the_fold_nothing_is_calibrated() {
+    let scene = scene(|_| ());
+    let seen = observations(&scene);
+    let mut pinhole = calibrate_rig(&seen, &RigSettings::default()).unwrap();
+    let names = seen.numbered_cameras();
+    let area = |rig: &PinholeRig| {
+        let found = rig.rig(&names, &seen).unwrap();
+        found.rig.cameras[0].coverage.covered_share()
+    };
+    let all = area(&pinhole);
+    // r - r^3 / 3 s^2 rises up to r = s: with 3 k1 s^2 = -1 and s = 0.3 up to 0.2 focal lengths off.
+    pinhole.cameras[0].distortion = [-1.0 / (3.0 * 0.09), 0.0, 0.0, 0.0, 0.0];
+    let part = area(&pinhole);
+    assert!(part > 0.0 && part < all, "{part} of {all}");
+    // And none at all.
+    pinhole.cameras[0].distortion = [f64::NAN; 5];
+    assert_eq!(
+        pinhole.rig(&names, &seen).unwrap_err(),
+        PinholeError::NoRays { camera_idx: 0 }
+    );
 }

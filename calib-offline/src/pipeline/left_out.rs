@@ -23,10 +23,14 @@ pub fn left_out(parts: &Parts, names: &[String]) -> Vec<LeftOut> {
             reason: "excluded by the user".to_string(),
         });
     }
-    let estimate = parts.estimate;
+    let solution = parts.solution;
     for (pose_idx, pose) in parts.observations.poses.iter().enumerate() {
-        let is_named = parts.findings.iter().any(|finding| finding.pose == *pose);
-        if !is_named && estimate.observations.poses.binary_search(pose).is_err() {
+        let is_named = parts
+            .solution
+            .findings
+            .iter()
+            .any(|finding| finding.pose == *pose);
+        if !is_named && solution.observations.poses.binary_search(pose).is_err() {
             let views = parts.observations.views.iter();
             list.push(LeftOut {
                 pose: *pose,
@@ -39,16 +43,16 @@ pub fn left_out(parts: &Parts, names: &[String]) -> Vec<LeftOut> {
             });
         }
     }
-    for (view, weights) in estimate
+    for (view, weights) in solution
         .observations
         .views
         .iter()
-        .zip(&estimate.robust_weights)
+        .zip(&solution.robust_weights)
     {
         let rejected = weights.iter().filter(|weight| **weight == 0.0).count();
         if rejected > 0 {
             list.push(LeftOut {
-                pose: estimate.observations.poses[view.pose_idx],
+                pose: solution.observations.poses[view.pose_idx],
                 camera: Some(names[view.camera_idx].clone()),
                 corner_count: rejected,
                 reason: format!(
@@ -58,7 +62,13 @@ pub fn left_out(parts: &Parts, names: &[String]) -> Vec<LeftOut> {
             });
         }
     }
-    list.extend(parts.findings.iter().filter_map(|f| screened_out(f, names)));
+    list.extend(
+        parts
+            .solution
+            .findings
+            .iter()
+            .filter_map(|f| screened_out(f, names)),
+    );
     for image in parts.corners.detection.iter().flat_map(|d| &d.images) {
         if let Outcome::Refused(refusal) = &image.outcome {
             list.push(LeftOut {

@@ -2,19 +2,15 @@
 
 use super::Corners;
 use super::left_out::{left_out, renumbered};
+use super::solution::Solution;
 use crate::adjust::Observations;
-use crate::adjust::StopReason;
 use crate::dataset::identity::input_sha256;
 use crate::dataset::{Dataset, stage};
 use crate::evaluate::half_data::HalfDataCheck;
 use crate::evaluate::verdict::{Figures, Thresholds, judge};
 use crate::evaluate::{CrossChecks, HeldOut, fit_stage_axes};
-use crate::field::Rig;
-use crate::init::screening::Finding;
-use crate::joint::Estimate;
 use crate::report::record::{
-    Calibration, ChoicesRecord, CornerRecord, EstimateRecord, HeldOutRecord, PoseRecord, SCHEMA,
-    StageAxis,
+    Calibration, CornerRecord, EstimateRecord, HeldOutRecord, PoseRecord, SCHEMA, StageAxis,
 };
 use nalgebra::Vector2;
 
@@ -26,18 +22,10 @@ pub struct Parts<'a> {
     pub corners: &'a Corners,
     /// What was offered to the estimate.
     pub observations: &'a Observations,
-    /// What it made of it.
-    pub estimate: &'a Estimate,
-    /// The rig that it gave.
-    pub rig: Rig,
-    /// What was found wrong with views.
-    pub findings: &'a [Finding],
-    /// Peak to valley of the board's shape and its standard deviation, mm.
-    pub board_peak_to_valley_mm: (f64, f64),
+    /// What the method made of it.
+    pub solution: &'a Solution,
     /// The check on unseen boards.
     pub held_out: &'a HeldOut,
-    /// The checks against itself.
-    pub checks: CrossChecks,
     /// What counts as good.
     pub thresholds: &'a Thresholds,
 }
@@ -50,11 +38,11 @@ pub fn record(parts: &Parts) -> Calibration {
         .iter()
         .map(|c| c.name.clone())
         .collect();
-    let estimate = parts.estimate;
-    let rig = parts.rig.clone();
-    let corners = corner_records(estimate);
+    let solution = parts.solution;
+    let rig = solution.rig.clone();
+    let corners = corner_records(solution);
     let poses = pose_records(parts, rig.cameras.len());
-    let summary = estimate_record(estimate, &corners);
+    let summary = estimate_record(solution, &corners);
     let held_out = held_out_record(parts.held_out);
     let verdict = judge(
         &Figures {
@@ -62,59 +50,60 @@ pub fn record(parts: &Parts) -> Calibration {
             rms_px: summary.rms_px,
             held_out_rms_px: held_out.as_ref().and_then(|h| h.rms_px),
             neighbor_rms_percent: held_out.as_ref().and_then(|h| h.neighbor_rms_percent),
-            half_data_ratio: match &parts.checks.half_data {
-                HalfDataCheck::Compared(halves) => Some(halves.ratio),
-                HalfDataCheck::Skipped(_) => None,
-            },
+            half_data_ratio: solution.checks.as_ref().and_then(half_data_ratio),
             corners: (summary.corners_used, summary.corners_rejected),
-            suspect_views: (parts.findings.len(), parts.observations.views.len()),
-            pose_count: estimate.pose_count(),
+            suspect_views: (solution.findings.len(), parts.observations.views.len()),
+            pose_count: solution.pose_count(),
             covered_share: rig
                 .cameras
                 .iter()
                 .map(|c| (c.name.clone(), c.coverage.covered_share()))
                 .collect(),
-            settled: matches!(
-                estimate.stop,
-                StopReason::Converged | StopReason::NoFurtherDecrease
-            ),
+            settled: solution.settled,
         },
         parts.thresholds,
     );
     Calibration {
         schema: SCHEMA.to_string(),
         tool_version: env!("CARGO_PKG_VERSION").to_string(),
-        method: "joint".to_string(),
+        method: solution.method.name().to_string(),
         input_sha256: input_sha256(parts.dataset, &parts.corners.views),
         board: parts.dataset.board,
-        board_shape: estimate.model.board_shape.clone(),
+        board_shape: solution.board_shape.clone(),
         stage_axes: stage_axes(parts, &poses),
         poses,
         rig,
         corners,
         left_out: left_out(parts, &names),
-        renumbered: renumbered(parts.findings, &names),
+        renumbered: renumbered(&solution.findings, &names),
         estimate: summary,
-        choices: Some(choices(parts)),
+        choices: solution.choices.clone(),
         held_out,
-        checks: Some(parts.checks.clone()),
+        checks: solution.checks.clone(),
         verdict,
     }
 }
 
-fn corner_records(estimate: &Estimate) -> Vec<CornerRecord> {
+fn half_data_ratio(checks: &CrossChecks) -> Option<f64> {
+    match &checks.half_data {
+        HalfDataCheck::Compared(halves) => Some(halves.ratio),
+        HalfDataCheck::Skipped(_) => None,
+    }
+}
+
+fn corner_records(solution: &Solution) -> Vec<CornerRecord> {
     let mut records = Vec::new();
-    for ((view, residuals), weights) in estimate
+    for ((view, residuals), weights) in solution
         .observations
         .views
         .iter()
-        .zip(&estimate.residuals)
-        .zip(&estimate.robust_weights)
+        .zip(&solution.residuals)
+        .zip(&solution.robust_weights)
     {
         for ((corner, residual), weight) in view.corners.iter().zip(residuals).zip(weights) {
             records.push(CornerRecord {
                 camera_idx: view.camera_idx,
-                pose: estimate.observations.poses[view.pose_idx],
+                pose: solution.observations.poses[view.pose_idx],
                 row: corner.row,
                 col: corner.col,
                 observed: corner.pixel,
@@ -127,33 +116,19 @@ fn corner_records(estimate: &Estimate) -> Vec<CornerRecord> {
     records
 }
 
-fn estimate_record(estimate: &Estimate, corners: &[CornerRecord]) -> EstimateRecord {
+fn estimate_record(solution: &Solution, corners: &[CornerRecord]) -> EstimateRecord {
     let used: Vec<f64> = corners
         .iter()
         .filter(|c| c.weight > 0.0)
         .map(|c| c.residual_px.norm())
         .collect();
     EstimateRecord {
-        cost_per_iteration: estimate.costs.clone(),
-        stop_reason: estimate.stop.to_string(),
-        sigma_px: estimate.noise.variance_px2.sqrt(),
+        cost_per_iteration: solution.costs.clone(),
+        stop_reason: solution.stop_reason.clone(),
+        sigma_px: solution.sigma_px,
         rms_px: rms(&used).unwrap_or(0.0),
         corners_used: used.len(),
         corners_rejected: corners.len() - used.len(),
-    }
-}
-
-fn choices(parts: &Parts) -> ChoicesRecord {
-    let estimate = parts.estimate;
-    let (board_peak_to_valley_mm, board_peak_to_valley_sd_mm) = parts.board_peak_to_valley_mm;
-    ChoicesRecord {
-        tried: estimate.choices.clone(),
-        smoothness: estimate.smoothness.clone(),
-        noise_freedom: estimate.noise.freedom,
-        neighbor_correlation: estimate.neighbor_correlation,
-        effective_share: estimate.effective_share,
-        board_peak_to_valley_mm,
-        board_peak_to_valley_sd_mm,
     }
 }
 
@@ -177,24 +152,24 @@ fn held_out_record(held_out: &HeldOut) -> Option<HeldOutRecord> {
 }
 
 fn pose_records(parts: &Parts, camera_count: usize) -> Vec<PoseRecord> {
-    let estimate = parts.estimate;
+    let solution = parts.solution;
     let all_poses = crate::dataset::corners::poses(&parts.corners.views);
-    estimate
-        .rig_from_board()
-        .into_iter()
+    solution
+        .rig_from_board
+        .iter()
         .enumerate()
         .map(|(pose_idx, rig_from_board)| {
-            let pose = estimate.observations.poses[pose_idx];
+            let pose = solution.observations.poses[pose_idx];
             let rms_px = (0..camera_count)
                 .map(|camera_idx| {
-                    let view = estimate
+                    let view = solution
                         .observations
                         .views
                         .iter()
                         .position(|v| v.camera_idx == camera_idx && v.pose_idx == pose_idx)?;
-                    let used: Vec<f64> = estimate.residuals[view]
+                    let used: Vec<f64> = solution.residuals[view]
                         .iter()
-                        .zip(&estimate.robust_weights[view])
+                        .zip(&solution.robust_weights[view])
                         .filter(|(_, weight)| **weight > 0.0)
                         .filter_map(|(residual, _)| residual.map(|r| r.norm()))
                         .collect();
@@ -203,7 +178,7 @@ fn pose_records(parts: &Parts, camera_count: usize) -> Vec<PoseRecord> {
                 .collect();
             PoseRecord {
                 pose,
-                rig_from_board,
+                rig_from_board: *rig_from_board,
                 rms_px,
                 stage_angle_deg: stage::entry(parts.dataset, &all_poses, pose).angle_deg,
             }
