@@ -1,5 +1,6 @@
 //! What can go wrong, one variant per stage, each wrapping that stage's own error.
 
+use crate::alternating::AlternatingError;
 use crate::atomic_file::WriteError;
 use crate::dataset::{CornersError, ManifestError, SufficiencyError};
 use crate::demo::DemoError;
@@ -70,6 +71,9 @@ pub enum Error {
     /// No baseline.
     #[error("the pinhole baseline failed")]
     Pinhole(#[from] PinholeError),
+    /// No estimate by the published procedure.
+    #[error("the published procedure failed")]
+    Alternating(#[from] AlternatingError),
     /// A calibration that was read.
     #[error("the calibration cannot be used")]
     Calibration(#[from] CalibrationError),
@@ -156,12 +160,6 @@ pub enum UsageError {
         /// The rig.
         path: PathBuf,
     },
-    /// A method that this version does not have.
-    #[error("the method \"{method}\" is not in this version")]
-    NoSuchMethod {
-        /// Its name.
-        method: &'static str,
-    },
     /// A pose that the recording does not have.
     #[error("there is no pose {pose} to leave out; the last is pose {last}")]
     NoSuchPose {
@@ -190,7 +188,6 @@ impl UsageError {
             Self::OneCamera { .. } => {
                 "calibrate two cameras together; a single one gives rays only"
             }
-            Self::NoSuchMethod { .. } => "leave --method out for the joint estimate",
             Self::NoSuchPose { .. } => "poses count from 0; see calib-offline inspect DATASET",
             Self::OutputIsInput { .. } => "choose another place with -o",
         };
@@ -237,6 +234,7 @@ impl Error {
             | Self::Init(_)
             | Self::Estimate(_)
             | Self::Pinhole(_)
+            | Self::Alternating(_)
             | Self::Pack(PackError::NothingCalibrated { .. }) => DATA_UNDETERMINED,
             Self::Manifest(_)
             | Self::Corners(_)
@@ -287,6 +285,11 @@ impl Error {
             ),
             Self::Pinhole(_) => Some(
                 "leave the baseline out: calib-offline calibrate makes no assumption about the lens"
+                    .to_owned(),
+            ),
+            Self::Alternating(_) => Some(
+                "leave --method out: the joint estimate takes all views together; or add boards at \
+                 other distances"
                     .to_owned(),
             ),
             Self::Calibration(error) => error.remedy(),

@@ -4,7 +4,8 @@
 //! that cannot be what they claim; the joint estimate adjusts everything and looks at the views
 //! once more; held-out boards and the calibration itself judge it; the record says all of it.
 
-pub mod jointly;
+pub mod alternatingly;
+mod jointly;
 mod left_out;
 pub mod solution;
 mod summary;
@@ -22,6 +23,7 @@ use crate::evaluate::verdict::Thresholds;
 use crate::evaluate::{Folds, held_out};
 use crate::progress::Progress;
 use crate::report::Calibration;
+use alternatingly::alternating_solution;
 use clap::ValueEnum;
 use jointly::joint_solution;
 use solution::{Solved, Task};
@@ -163,9 +165,7 @@ pub fn calibrate_corners(
     };
     let found = match settings.method {
         Method::Joint => joint_solution(&observations, &task, progress),
-        Method::Alternating => Err(Error::Usage(UsageError::NoSuchMethod {
-            method: settings.method.name(),
-        })),
+        Method::Alternating => alternating_solution(&observations, &task, progress),
     };
     let Solved { solution, folds } = found.map_err(explained)?;
     let calibration = summary::record(&summary::Parts {

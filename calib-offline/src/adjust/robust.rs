@@ -158,6 +158,31 @@ pub fn reweight(
     (noise, weights)
 }
 
+/// Weight of every corner relative to that of one without residual: 0 to 1, and 0 for one that is
+/// rejected or has no residual.
+pub fn relative_weights(
+    residuals: &[Vec<Option<Vector2<f64>>>],
+    observations: &Observations,
+    noise: &StudentT,
+) -> Vec<Vec<f64>> {
+    let relative = |residual: &Option<Vector2<f64>>, relative_weight: f64| {
+        let squared = residual.map(|r| r.norm_squared() * relative_weight);
+        // The largest weight of the distribution is (nu + 2) / nu, at zero.
+        squared.map_or(0.0, |s| noise.weight(s) / noise.weight(0.0))
+    };
+    residuals
+        .iter()
+        .zip(&observations.views)
+        .map(|(residuals, view)| {
+            residuals
+                .iter()
+                .zip(&view.corners)
+                .map(|(residual, corner)| relative(residual, corner.relative_weight))
+                .collect()
+        })
+        .collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

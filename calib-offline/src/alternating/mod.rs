@@ -25,6 +25,7 @@
 
 pub mod alternation;
 pub mod estimate;
+pub mod field_rig;
 pub mod k_means;
 pub mod line_fit;
 pub mod mixing;

@@ -141,8 +141,8 @@ mod tests {
         assert!((12..=28).contains(&network.rank()), "{}", network.rank());
         let between = Vector2::new(211.0, 333.0);
         let answer = network.evaluate(PixelPoint::new(between.x, between.y));
-        // Double precision times the weights' size, some 1e9 mm.
-        assert!((answer - quartic(&between)).norm() < 1e-4, "{answer}");
+        // A ten-thousandth of the board: what is cut off of the weakest directions.
+        assert!((answer - quartic(&between)).norm() < 0.01, "{answer}");
     }
 
     #[test]

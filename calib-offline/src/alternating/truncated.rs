@@ -48,8 +48,8 @@ pub fn solve_truncated(mut a: DMatrix<f64>, mut b: DMatrix<f64>, cut: f64) -> Op
         let mut v = column;
         v[0] += length.copysign(v[0]);
         let scale = 2.0 / v.norm_squared();
-        for matrix in [&mut a, &mut b] {
-            let from = if matrix.ncols() == cols { steps } else { 0 };
+        // Columns to the left are zero from here down.
+        for (matrix, from) in [(&mut a, steps), (&mut b, 0)] {
             for c in from..matrix.ncols() {
                 let mut column = matrix.column_mut(c);
                 let mut part = column.rows_mut(steps, rows - steps);

@@ -5,7 +5,7 @@ use super::output::Console;
 use super::place::check_results_folder;
 use crate::atomic_file::{make_folder, write_set};
 use crate::dataset::Dataset;
-use crate::error::{Error, UsageError};
+use crate::error::Error;
 use crate::pack::{PackSettings, pack_nearest};
 use crate::pipeline::{CalibrateSettings, Method};
 use crate::progress::Progress;
@@ -100,11 +100,6 @@ pub fn run(
     console: &Console,
     estimate: Estimate<'_>,
 ) -> Result<Outcome, Error> {
-    if args.method == Method::Alternating {
-        return Err(Error::Usage(UsageError::NoSuchMethod {
-            method: args.method.name(),
-        }));
-    }
     check_results_folder(&args.output, &FILES, args.force)?;
     let mut dataset = Dataset::load(&args.dataset)?;
     dataset.excluded_poses.extend(&args.exclude);

@@ -60,15 +60,20 @@ impl CoverageMask {
         )
     }
 
-    /// Whether the pixel is in the calibrated area.
-    pub fn contains(&self, pixel: PixelPoint) -> bool {
+    /// Number of the cell that a pixel lies in; `None` off the sensor.
+    pub fn cell_of(&self, pixel: PixelPoint) -> Option<usize> {
         if !self.sensor.contains(pixel) {
-            return false;
+            return None;
         }
         let (width_px, height_px) = self.cell_size_px();
         let i = (((pixel.u + 0.5) / width_px) as usize).min(self.cells_u - 1);
         let j = (((pixel.v + 0.5) / height_px) as usize).min(self.cells_v - 1);
-        self.covered[j * self.cells_u + i]
+        Some(j * self.cells_u + i)
+    }
+
+    /// Whether the pixel is in the calibrated area.
+    pub fn contains(&self, pixel: PixelPoint) -> bool {
+        self.cell_of(pixel).is_some_and(|cell| self.covered[cell])
     }
 
     /// Middles of the calibrated cells, row by row.

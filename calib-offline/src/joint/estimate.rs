@@ -5,7 +5,7 @@ use super::evidence::{Smoothness, SmoothnessFound};
 use super::fit::Fit;
 use super::rebase::rebase;
 use crate::adjust::levenberg::{Settings, StopReason};
-use crate::adjust::robust::StudentT;
+use crate::adjust::robust::{StudentT, relative_weights};
 use crate::adjust::{CameraModel, Model, Observations};
 use crate::board::BoardShape;
 use crate::field::polynomial::term_count;
@@ -145,21 +145,7 @@ pub(super) fn finish(
     choices: Vec<Choice>,
 ) -> Estimate {
     let residuals = fit.residuals().to_vec();
-    let robust_weights = residuals
-        .iter()
-        .zip(&observations.views)
-        .map(|(residuals, view)| {
-            residuals
-                .iter()
-                .zip(&view.corners)
-                .map(|(residual, corner)| {
-                    let squared = residual.map(|r| r.norm_squared() * corner.relative_weight);
-                    // The largest weight of the distribution is (nu + 2) / nu, at zero.
-                    squared.map_or(0.0, |s| fit.noise.weight(s) / fit.noise.weight(0.0))
-                })
-                .collect()
-        })
-        .collect();
+    let robust_weights = relative_weights(&residuals, &observations, &fit.noise);
     Estimate {
         smoothness: fit.smoothness.found(&fit.model),
         model: fit.model.clone(),

@@ -72,6 +72,7 @@ pub fn joint_solution(
             stop_reason: estimate.stop.to_string(),
             settled: is_settled,
             choices: Some(choices),
+            alternating: None,
             checks: Some(checks),
         },
         folds,

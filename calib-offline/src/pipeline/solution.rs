@@ -8,7 +8,7 @@ use crate::evaluate::{CrossChecks, Folds};
 use crate::field::Rig;
 use crate::geometry::RigidTransform;
 use crate::init::screening::Finding;
-use crate::report::record::ChoicesRecord;
+use crate::report::record::{AlternatingRecord, ChoicesRecord};
 use nalgebra::Vector2;
 
 /// What a method is to do.
@@ -50,6 +50,8 @@ pub struct Solution {
     pub settled: bool,
     /// What the method chose by itself, if it chooses.
     pub choices: Option<ChoicesRecord>,
+    /// How the published procedure went, if it was that.
+    pub alternating: Option<AlternatingRecord>,
     /// Checks of the calibration against itself, where the method has them.
     pub checks: Option<CrossChecks>,
 }

@@ -78,6 +78,7 @@ pub fn record(parts: &Parts) -> Calibration {
         renumbered: renumbered(&solution.findings, &names),
         estimate: summary,
         choices: solution.choices.clone(),
+        alternating: solution.alternating.clone(),
         held_out,
         checks: solution.checks.clone(),
         verdict,

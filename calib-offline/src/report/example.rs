@@ -105,6 +105,7 @@ pub fn calibration() -> Calibration {
         }],
         choices: Some(choices()),
         checks: Some(checks()),
+        alternating: None,
         held_out: Some(held_out()),
         verdict: Verdict {
             grade: Grade::Doubtful,

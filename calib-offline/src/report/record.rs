@@ -1,5 +1,7 @@
 //! `calibration.json`: everything a calibration found, versioned, enough to draw every figure again.
 
+use crate::alternating::estimate::{PlacementCircles, StartCost};
+use crate::alternating::spread::SpreadChoice;
 pub use crate::board::BoardShape;
 use crate::board::BoardSpec;
 pub use crate::evaluate::CrossChecks;
@@ -53,6 +55,9 @@ pub struct Calibration {
     /// What the estimate chose by itself; `None` in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub choices: Option<ChoicesRecord>,
+    /// How the published procedure went; `None` for another method.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub alternating: Option<AlternatingRecord>,
     /// Held-out check; `None` if there were too few poses for one.
     pub held_out: Option<HeldOutRecord>,
     /// Checks of the calibration against itself; `None` in files of earlier versions.
@@ -171,6 +176,27 @@ pub struct ChoicesRecord {
     pub board_peak_to_valley_mm: f64,
     /// Its standard deviation, as far as the terms of the shape are independent, mm.
     pub board_peak_to_valley_sd_mm: f64,
+}
+
+/// How the published procedure went.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AlternatingRecord {
+    /// Spread of the networks.
+    pub spread: SpreadChoice,
+    /// Starts tried; the one with the lowest cost was taken.
+    pub starts: Vec<StartCost>,
+    /// Circles of the stage per placement; empty without placements.
+    pub circles: Vec<PlacementCircles>,
+    /// Whether poses were projected onto the circles: only where that lowers the cost.
+    pub projected: bool,
+    /// Sweeps over rays and poses.
+    pub sweeps: usize,
+    /// Farthest that a control point moved in the last sweep, mm.
+    pub last_step_mm: f64,
+    /// Share by which the cost fell in the last tenth of the sweeps; `None` at rest.
+    pub still_falling: Option<f64>,
+    /// Per camera: RMS difference of the field from the rays of single pixels, px.
+    pub field_rms_error_px: Vec<f64>,
 }
 
 /// Boards the estimate never saw, measured with the rig.

@@ -172,6 +172,7 @@ pub fn calibration() -> Calibration {
             corners_rejected: 0,
         },
         choices: None,
+        alternating: None,
         held_out: None,
         checks: None,
         verdict: Verdict {

@@ -1,4 +1,5 @@
 use super::*;
+use crate::error::UsageError;
 use crate::cli::settings::{Narration, Settings};
 use crate::dataset::{CornersError, SufficiencyError};
 use crate::report::example;

@@ -1,0 +1,145 @@
+//! The published procedure as a method of the pipeline.
+
+use super::Method;
+use super::solution::{Solution, Solved, Task, folds_wanted};
+use crate::adjust::Observations;
+use crate::adjust::robust::{relative_weights, reweight};
+use crate::alternating::alternation::{Alternated, AlternationStop};
+use crate::alternating::field_rig::FieldRig;
+use crate::alternating::{AlternatingError, AlternatingEstimate, AlternatingSettings, estimate};
+use crate::board::BoardShape;
+use crate::error::Error;
+use crate::evaluate::estimate_folds;
+use crate::evaluate::held_out::Estimated;
+use crate::evaluate::reprojection::residuals;
+use crate::field::BaseLens;
+use crate::init::InitError;
+use crate::init::rig::{RigStart, start_rig};
+use crate::progress::Progress;
+use crate::report::record::AlternatingRecord;
+
+/// Why some training poses gave no estimate.
+#[derive(Debug, thiserror::Error)]
+pub enum FoldError {
+    /// No start.
+    #[error(transparent)]
+    Start(#[from] InitError),
+    /// No estimate.
+    #[error(transparent)]
+    Estimate(#[from] AlternatingError),
+}
+
+/// Screens, runs the published procedure, and checks it without the poses of each fold.
+///
+/// # Errors
+/// Data that cannot determine the answer.
+pub fn alternating_solution(
+    offered: &Observations,
+    task: &Task,
+    progress: &dyn Progress,
+) -> Result<Solved, Error> {
+    progress.begin("initialize", 1);
+    let start = start_rig(offered)?;
+    progress.end();
+
+    progress.begin("estimate", 1);
+    let (found, fields) = estimate_rig(&start, task.names, task.placement)?;
+    progress.end();
+
+    // Poses that no camera placed take no part.
+    let used = found
+        .observations
+        .with_pose_indices(|pose_idx| found.rig_from_board[pose_idx].is_some());
+    let rig_from_board: Vec<_> = found.rig_from_board.iter().flatten().copied().collect();
+    let board_shape = BoardShape::default();
+    let residuals = residuals(&fields.rig, &rig_from_board, &board_shape, &used);
+    let (noise, _) = reweight(&residuals, &used, 1.0, None);
+    let robust_weights = relative_weights(&residuals, &used, &noise);
+
+    let folds = folds_wanted(&used, task.folds);
+    progress.begin("cross-checks", folds);
+    let estimate_fold = |training: &Observations| estimate_alternating(training, task.placement);
+    let folds = estimate_folds(&used, folds, &estimate_fold, progress);
+    progress.end();
+    let record = record(&found, &fields);
+    Ok(Solved {
+        solution: Solution {
+            method: Method::Alternating,
+            findings: start.findings,
+            rig: fields.rig,
+            rig_from_board,
+            board_shape,
+            observations: used,
+            residuals,
+            robust_weights,
+            sigma_px: noise.variance_px2.sqrt(),
+            stop_reason: stop_reason(&found.alternated),
+            settled: found.alternated.still_falling().is_none(),
+            costs: found.alternated.rms_mm,
+            choices: None,
+            alternating: Some(record),
+            checks: None,
+        },
+        folds,
+    })
+}
+
+/// The published procedure on some training poses. The cameras of its rig are named by number.
+///
+/// # Errors
+/// [`FoldError`].
+pub fn estimate_alternating(
+    training: &Observations,
+    placement: &dyn Fn(usize) -> Option<usize>,
+) -> Result<Estimated, FoldError> {
+    let start = start_rig(training)?;
+    let (_, fields) = estimate_rig(&start, &training.numbered_cameras(), placement)?;
+    Ok(Estimated {
+        rig: fields.rig,
+        board_shape: BoardShape::default(),
+    })
+}
+
+fn estimate_rig(
+    start: &RigStart,
+    names: &[String],
+    placement: &dyn Fn(usize) -> Option<usize>,
+) -> Result<(AlternatingEstimate, FieldRig), AlternatingError> {
+    let found = estimate(start, placement, &AlternatingSettings::default())?;
+    let bases: Vec<BaseLens> = start.fields.iter().map(|field| field.base).collect();
+    let fields = found
+        .rig(names, &bases)
+        .ok_or(AlternatingError::FewBoards)?;
+    Ok((found, fields))
+}
+
+fn stop_reason(alternated: &Alternated) -> String {
+    let sweeps = alternated.rms_mm.len().saturating_sub(1);
+    let stop = match alternated.stop {
+        AlternationStop::StepBelowLimit => {
+            format!("stopped after {sweeps} sweeps: no control point moves any more by what counts")
+        }
+        AlternationStop::SweepLimit => format!("stopped at the limit of {sweeps} sweeps"),
+    };
+    match alternated.still_falling() {
+        None => stop,
+        Some(share) => format!(
+            "{stop}, with the cost still falling ({:.1} % in the last tenth of them): the poses are not \
+             where they would come to rest",
+            100.0 * share
+        ),
+    }
+}
+
+fn record(found: &AlternatingEstimate, fields: &FieldRig) -> AlternatingRecord {
+    AlternatingRecord {
+        spread: found.spread.clone(),
+        starts: found.starts.clone(),
+        circles: found.circles.clone(),
+        projected: found.projected,
+        sweeps: found.alternated.rms_mm.len().saturating_sub(1),
+        last_step_mm: found.alternated.last_step_mm,
+        still_falling: found.alternated.still_falling(),
+        field_rms_error_px: fields.rms_error_px.clone(),
+    }
+}
