@@ -5,6 +5,7 @@ pub mod alternating;
 pub mod atomic_file;
 pub mod board;
 pub mod cli;
+pub mod compare;
 pub mod dataset;
 pub mod demo;
 pub mod detect;

@@ -12,7 +12,7 @@ mod summary;
 
 use crate::adjust::Observations;
 use crate::dataset::corners::{load_corners, poses};
-use crate::dataset::split::without_excluded;
+use crate::dataset::split::{Selection, without_excluded};
 use crate::dataset::sufficiency::{SufficiencyError, check_sufficiency};
 use crate::dataset::{Dataset, View, stage};
 use crate::detect::suspicion::suspicious_labels;
@@ -141,10 +141,7 @@ pub fn calibrate_corners(
     settings: &CalibrateSettings,
     progress: &dyn Progress,
 ) -> Result<Checked, Error> {
-    check_excluded(dataset, &corners.views)?;
-    let selection = without_excluded(corners.views.clone(), &dataset.excluded_poses);
-    check_sufficiency(dataset, &selection.used)
-        .map_err(|error| with_refusals(dataset, error, corners.detection.as_ref()))?;
+    let selection = selected(dataset, corners)?;
     // Labels that contradict each other are looked for only where they would explain a failure.
     let explained = |error: Error| match suspicious_labels(dataset, &selection.used) {
         Some(suspicion) if error.exit_code() == DATA_UNDETERMINED => Error::Labels {
@@ -153,10 +150,8 @@ pub fn calibrate_corners(
         },
         _ => error,
     };
-    let sensors = dataset.cameras.iter().map(|camera| camera.sensor).collect();
-    let observations = Observations::new(dataset.board, sensors, &selection.used);
-
-    let names: Vec<String> = dataset.cameras.iter().map(|c| c.name.clone()).collect();
+    let observations = observed(dataset, &selection);
+    let names = camera_names(dataset);
     let all_poses = poses(&corners.views);
     let task = Task {
         names: &names,
@@ -181,6 +176,32 @@ pub fn calibrate_corners(
         offered: observations,
         folds,
     })
+}
+
+/// What a dataset offers to any method: its corners without the poses that the user leaves out.
+///
+/// # Errors
+/// A pose to leave out that is none; too few corners.
+pub fn offered(dataset: &Dataset, corners: &Corners) -> Result<Observations, Error> {
+    Ok(observed(dataset, &selected(dataset, corners)?))
+}
+
+/// Names of the cameras, in order.
+pub fn camera_names(dataset: &Dataset) -> Vec<String> {
+    dataset.cameras.iter().map(|c| c.name.clone()).collect()
+}
+
+fn selected(dataset: &Dataset, corners: &Corners) -> Result<Selection, Error> {
+    check_excluded(dataset, &corners.views)?;
+    let selection = without_excluded(corners.views.clone(), &dataset.excluded_poses);
+    check_sufficiency(dataset, &selection.used)
+        .map_err(|error| with_refusals(dataset, error, corners.detection.as_ref()))?;
+    Ok(selection)
+}
+
+fn observed(dataset: &Dataset, selection: &Selection) -> Observations {
+    let sensors = dataset.cameras.iter().map(|camera| camera.sensor).collect();
+    Observations::new(dataset.board, sensors, &selection.used)
 }
 
 /// Every pose that is left out must be one: a slip in a number would leave the bad pose in.

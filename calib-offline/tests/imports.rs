@@ -13,7 +13,7 @@ const LAYERS: [&[&str]; 10] = [
     &["joint", "pinhole", "alternating"],
     &["evaluate", "matches", "pack", "report"],
     &["error"],
-    &["pipeline", "demo"],
+    &["pipeline", "demo", "compare"],
     &["cli"],
 ];
 

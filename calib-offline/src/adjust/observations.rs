@@ -2,7 +2,7 @@
 //! change while parameters move computed once.
 
 use crate::board::BoardSpec;
-use crate::dataset::View;
+use crate::dataset::{Corner, View};
 use crate::field::polynomial::{self, AxisValues, Polynomial};
 use crate::field::spline::AxisWeights;
 use crate::field::{BaseLens, CoverageMask, FieldSample, RayField};
@@ -49,6 +49,18 @@ pub struct ObservedCorner {
     pub pixel: PixelPoint,
     /// Inverse variance relative to the typical corner of the dataset.
     pub relative_weight: f64,
+}
+
+impl ObservedCorner {
+    /// As a dataset has it.
+    pub fn labelled(&self) -> Corner {
+        Corner {
+            row: self.row,
+            col: self.col,
+            pixel: self.pixel,
+            sigma_px: None,
+        }
+    }
 }
 
 impl Observations {

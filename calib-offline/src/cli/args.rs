@@ -1,6 +1,6 @@
 //! What can be written on the command line. Each help text starts with an example.
 
-use super::{calibrate, demo, detect, inspect, measure, pack, simulate};
+use super::{calibrate, compare, demo, detect, inspect, measure, pack, simulate};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::num::NonZeroUsize;
 
@@ -42,6 +42,8 @@ pub struct Cli {
 pub enum Verb {
     /// Calibrate from a dataset: calibration.json, rig.rays and report.html
     Calibrate(calibrate::CalibrateArgs),
+    /// Compare the ray field with a pinhole on the same boards
+    Compare(compare::CompareArgs),
     /// Run the whole chain on the data that comes with the program
     Demo(demo::DemoArgs),
     /// Find the board's corners in a dataset's images: corners.csv

@@ -5,6 +5,7 @@
 
 pub mod args;
 pub mod calibrate;
+pub mod compare;
 pub mod demo;
 pub mod detect;
 pub mod detect_target;
@@ -59,6 +60,7 @@ pub fn main() -> ExitCode {
 fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
     match verb {
         Verb::Calibrate(args) => calibrate::run(args, console, &crate::pipeline::calibrate),
+        Verb::Compare(args) => compare::run(args, console),
         Verb::Demo(args) => demo::run(args, console),
         Verb::Detect(args) => recording::detect(args, console),
         Verb::Inspect(args) => inspect::run(args, console),

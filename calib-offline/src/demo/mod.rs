@@ -11,7 +11,6 @@ pub mod words;
 use firmware_sim::client::ClientError;
 use ray_runtime::OpenError;
 use serde::Serialize;
-use std::path::PathBuf;
 
 pub use device::DeviceCheck;
 pub use known::KnownPoints;
@@ -38,24 +37,6 @@ pub enum DemoError {
     /// The blob just packed does not open.
     #[error("the runtime refuses the blob just packed: {0}")]
     Open(#[from] OpenError),
-    /// The table of true points cannot be read.
-    #[error("{}: is no table of true points", file.display())]
-    Truth {
-        /// The file.
-        file: PathBuf,
-        /// What is wrong.
-        source: csv::Error,
-    },
-    /// The table of true points does not go with its matches.
-    #[error("{}: has {have} rows, its matches {need}", file.display())]
-    TruthCount {
-        /// The file.
-        file: PathBuf,
-        /// Rows.
-        have: usize,
-        /// Matches.
-        need: usize,
-    },
     /// The simulated device cannot listen.
     #[error("the simulated device cannot be started")]
     Start(#[source] std::io::Error),

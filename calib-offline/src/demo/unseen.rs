@@ -3,8 +3,8 @@
 use super::DemoError;
 use crate::adjust::Observations;
 use crate::error::Error;
-use crate::evaluate::Folds;
 use crate::evaluate::held_out::{BoardErrors, Fold, measure_boards};
+use crate::evaluate::{Folds, rms};
 use crate::matches::source::BlobSource;
 use crate::pack::{AlignedBytes, PackSettings, pack_nearest};
 use ray_runtime::RayBlob;
@@ -132,10 +132,4 @@ impl BoardFigures {
             unmet: errors.unmet_count,
         })
     }
-}
-
-/// Root mean square; `None` of nothing.
-fn rms(values: &[f64]) -> Option<f64> {
-    (!values.is_empty())
-        .then(|| (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt())
 }

@@ -239,12 +239,7 @@ fn covered(rig: &Rig, view: &ViewBlock, outside_count: &mut usize) -> Vec<Corner
                 *outside_count += 1;
                 return None;
             }
-            Some(Corner {
-                row: corner.row,
-                col: corner.col,
-                pixel: corner.pixel,
-                sigma_px: None,
-            })
+            Some(corner.labelled())
         })
         .collect()
 }

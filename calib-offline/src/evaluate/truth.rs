@@ -2,7 +2,7 @@
 
 use crate::geometry::best_placement;
 use nalgebra::Vector3;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A measured point with its truth, one frame for all three, mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,6 +13,29 @@ pub struct PointWithTruth {
     pub true_mm: Vector3<f64>,
     /// What the true rays of the same pixels give: the limit that the noise of the pixels sets.
     pub oracle_mm: Vector3<f64>,
+}
+
+/// Where a point is, and what the true rays of its pixels give: a row of a table of true points, whose
+/// other columns are for other uses. Datum frame, mm.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub struct TruePoint {
+    x: f64,
+    y: f64,
+    z: f64,
+    x_oracle: f64,
+    y_oracle: f64,
+    z_oracle: f64,
+}
+
+impl TruePoint {
+    /// With what was measured of it.
+    pub fn with(&self, measured_mm: Vector3<f64>) -> PointWithTruth {
+        PointWithTruth {
+            measured_mm,
+            true_mm: Vector3::new(self.x, self.y, self.z),
+            oracle_mm: Vector3::new(self.x_oracle, self.y_oracle, self.z_oracle),
+        }
+    }
 }
 
 /// RMS errors of measured points, mm.

@@ -34,6 +34,24 @@ pub enum MatchesError {
         /// A header that fits the rig.
         expected: String,
     },
+    /// The table of true points beside the matches cannot be read.
+    #[error("{}: is no table of true points", file.display())]
+    Truth {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong.
+        source: csv::Error,
+    },
+    /// The table of true points does not go with its matches.
+    #[error("{}: has {have} rows, its matches {need}", file.display())]
+    TruthCount {
+        /// The file.
+        file: PathBuf,
+        /// Rows.
+        have: usize,
+        /// Matches.
+        need: usize,
+    },
     /// A line that is no match.
     #[error("{}:{line}: {problem}", file.display())]
     Row {
@@ -134,6 +152,10 @@ impl MatchesError {
             }
             Self::Header { .. } => {
                 "name the columns after the rig's cameras; calib-offline inspect RIG lists them"
+            }
+            Self::Truth { .. } | Self::TruthCount { .. } => {
+                "simulate the dataset again, or take the table away: without it nothing is compared \
+                 with the truth"
             }
             Self::Row { problem, .. } => match problem {
                 RowProblem::NotText => "save the file as UTF-8 text",

@@ -6,6 +6,7 @@
 
 mod error;
 mod header;
+pub mod known;
 mod list;
 mod row;
 pub mod source;
@@ -13,6 +14,7 @@ mod stream;
 
 pub use error::MatchesError;
 pub use header::Columns;
+pub use known::{KnownMatches, read_known};
 pub use list::read_matches;
 pub use source::{Number, PointSource, Sighting, Status};
 pub use stream::{MeasureSummary, StreamError, measure_stream};

@@ -8,7 +8,7 @@ use crate::dataset::identity::input_sha256;
 use crate::dataset::{Dataset, stage};
 use crate::evaluate::half_data::HalfDataCheck;
 use crate::evaluate::verdict::{Figures, Thresholds, judge};
-use crate::evaluate::{CrossChecks, HeldOut, fit_stage_axes};
+use crate::evaluate::{CrossChecks, HeldOut, fit_stage_axes, rms};
 use crate::report::record::{
     Calibration, CornerRecord, EstimateRecord, HeldOutRecord, PoseRecord, SCHEMA, StageAxis,
 };
@@ -192,10 +192,4 @@ fn stage_axes(parts: &Parts, poses: &[PoseRecord]) -> Vec<StageAxis> {
     fit_stage_axes(poses, |pose| {
         stage::entry(parts.dataset, &all_poses, pose).placement
     })
-}
-
-/// Root mean square; `None` of nothing.
-fn rms(values: &[f64]) -> Option<f64> {
-    (!values.is_empty())
-        .then(|| (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt())
 }

@@ -1,0 +1,125 @@
+//! Boards that no method saw, judged on the corners that every method can answer: a method that
+//! refuses the difficult part of the image would else look the better for it.
+
+use crate::adjust::Observations;
+use crate::adjust::observations::ViewBlock;
+use crate::dataset::Corner;
+use crate::evaluate::held_out::{BoardErrors, Fold, measure_boards};
+use crate::evaluate::resection::residuals_with_free_pose;
+use crate::field::Rig;
+use crate::geometry::PixelPoint;
+use crate::matches::source::RigSource;
+
+/// Errors of one method on one board.
+#[derive(Debug, Clone, Default)]
+pub struct BoardScore {
+    /// Length of the residual vector of every common corner, pose refitted, px.
+    pub residuals_px: Vec<f64>,
+    /// The triangulated board.
+    pub boards: BoardErrors,
+}
+
+/// The boards of one fold.
+#[derive(Debug, Clone)]
+pub struct FoldScores {
+    /// Per board, then per method.
+    pub boards: Vec<Vec<BoardScore>>,
+    /// Corners offered.
+    pub corner_count: usize,
+    /// Corners that every method can answer.
+    pub common_count: usize,
+    /// Per method: corners outside its calibrated area.
+    pub unanswered: Vec<usize>,
+}
+
+/// Judges the estimates of one fold, one per method, all made without the same poses.
+pub fn score_fold(folds: &[&Fold]) -> FoldScores {
+    let rigs: Vec<&Rig> = folds.iter().map(|fold| &fold.rig).collect();
+    let mut scores = FoldScores {
+        boards: Vec::new(),
+        corner_count: 0,
+        common_count: 0,
+        unanswered: vec![0; folds.len()],
+    };
+    let Some(unseen) = folds.first().map(|fold| &fold.unseen) else {
+        return scores;
+    };
+    for view in &unseen.views {
+        scores.corner_count += view.corners.len();
+        for (rig, unanswered) in rigs.iter().zip(&mut scores.unanswered) {
+            let corners = view.corners.iter();
+            *unanswered += corners
+                .filter(|corner| !answers(rig, view, corner.pixel))
+                .count();
+        }
+    }
+    for pose_idx in 0..unseen.poses.len() {
+        let board = common_part(unseen.with_pose_indices(|idx| idx == pose_idx), &rigs);
+        scores.common_count += board.corner_count();
+        scores.boards.push(score_board(folds, &board));
+    }
+    scores
+}
+
+fn answers(rig: &Rig, view: &ViewBlock, pixel: PixelPoint) -> bool {
+    rig.cameras[view.camera_idx].coverage.contains(pixel)
+}
+
+/// The corners of a board that every rig has a ray for and, where two cameras saw them, a point.
+fn common_part(mut board: Observations, rigs: &[&Rig]) -> Observations {
+    for view in &mut board.views {
+        let whole = view.clone();
+        view.corners
+            .retain(|corner| rigs.iter().all(|rig| answers(rig, &whole, corner.pixel)));
+    }
+    let [left, right, ..] = &mut board.views[..] else {
+        return board;
+    };
+    let cameras = [left.camera_idx, right.camera_idx];
+    let mut unmet = Vec::new();
+    for corner in &left.corners {
+        let label = (corner.row, corner.col);
+        let other = right.corners.iter().find(|c| (c.row, c.col) == label);
+        let Some(other) = other else { continue };
+        let sightings = [(cameras[0], corner.pixel), (cameras[1], other.pixel)];
+        if rigs.iter().any(|rig| rig.triangulate(&sightings).is_err()) {
+            unmet.push(label);
+        }
+    }
+    for view in [left, right] {
+        view.corners
+            .retain(|corner| !unmet.contains(&(corner.row, corner.col)));
+    }
+    board
+}
+
+fn score_board(folds: &[&Fold], board: &Observations) -> Vec<BoardScore> {
+    let mut scores: Vec<BoardScore> = folds
+        .iter()
+        .map(|fold| {
+            // Without a frame there is always a source.
+            let source = RigSource::new(&fold.rig, None);
+            BoardScore {
+                residuals_px: Vec::new(),
+                boards: source.map_or_else(BoardErrors::default, |s| measure_boards(&s, board)),
+            }
+        })
+        .collect();
+    for view in &board.views {
+        let corners: Vec<Corner> = view.corners.iter().map(|c| c.labelled()).collect();
+        let residuals: Option<Vec<_>> = folds
+            .iter()
+            .map(|fold| {
+                let field = &fold.rig.cameras[view.camera_idx].field;
+                residuals_with_free_pose(field, &board.board, &fold.board_shape, &corners)
+            })
+            .collect();
+        // A view that one method cannot place counts for none.
+        for (score, residuals) in scores.iter_mut().zip(residuals.into_iter().flatten()) {
+            score
+                .residuals_px
+                .extend(residuals.iter().map(|r| r.norm()));
+        }
+    }
+    scores
+}

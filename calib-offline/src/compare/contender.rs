@@ -1,0 +1,152 @@
+//! The methods that are compared: each gives a rig from the same observations. A further method is
+//! one more entry of [`CONTENDERS`].
+
+use crate::adjust::Observations;
+use crate::board::BoardShape;
+use crate::error::Error;
+use crate::evaluate::held_out::Estimated;
+use crate::field::Rig;
+use crate::geometry::RigidTransform;
+use crate::init::rig::start_rig;
+use crate::joint::{Estimate, estimate_screened};
+use crate::pinhole::{Loss, PinholeError, RigSettings, Settings, calibrate_rig};
+use crate::pipeline::jointly::estimate_joint;
+
+/// What all methods are given: the views that agree with each other, as the joint estimate finds
+/// them.
+#[derive(Debug)]
+pub struct Shared {
+    /// The views.
+    pub observations: Observations,
+    /// The joint estimate that came of it on the way.
+    pub joint: Result<Estimate, Error>,
+}
+
+impl Shared {
+    /// Screens the views offered. Where there is no joint estimate they are taken as its start left
+    /// them, and without even a start as they were offered.
+    pub fn of(offered: &Observations) -> Self {
+        let start = match start_rig(offered) {
+            Ok(start) => start,
+            Err(error) => {
+                return Self {
+                    observations: offered.clone(),
+                    joint: Err(error.into()),
+                };
+            }
+        };
+        let started = start.observations.clone();
+        match estimate_screened(offered, start) {
+            Ok((estimate, _)) => Self {
+                observations: estimate.observations.clone(),
+                joint: Ok(estimate),
+            },
+            Err(error) => Self {
+                observations: started,
+                joint: Err(error.into()),
+            },
+        }
+    }
+}
+
+/// What a method made of all that it was given.
+#[derive(Debug)]
+pub struct Fitted {
+    /// The cameras.
+    pub rig: Rig,
+    /// Per pose of the observations; `None` where the method could not place the board.
+    pub rig_from_board: Vec<Option<RigidTransform>>,
+    /// Out-of-plane shape of the board.
+    pub board_shape: BoardShape,
+    /// Per view and corner: whether it was used, and not rejected as an outlier.
+    pub is_used: Vec<Vec<bool>>,
+    /// Largest difference of the rig's rays from the method's own, px; 0 where these are the rig's.
+    pub conversion_error_px: f64,
+}
+
+/// A method in a comparison.
+#[derive(Debug)]
+pub struct Contender {
+    /// Its name in files.
+    pub name: &'static str,
+    /// What it is called in words.
+    pub title: &'static str,
+    /// From everything; the cameras named as given.
+    pub fit: fn(&Shared, &[String]) -> Result<Fitted, Failure>,
+    /// From some poses. The cameras of its rig are named by number.
+    pub fold: fn(&Observations) -> Result<Estimated, Failure>,
+}
+
+/// Why a method has no answer, in words.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct Failure(pub String);
+
+/// The methods, in the order of the table. The first is what the others are measured against.
+pub const CONTENDERS: [Contender; 2] = [
+    Contender {
+        name: "pinhole",
+        title: "pinhole, Brown-Conrady",
+        fit: |shared, names| fit_pinhole(&shared.observations, names),
+        fold: |training| {
+            let fitted = fit_pinhole(training, &training.numbered_cameras())?;
+            Ok(Estimated {
+                rig: fitted.rig,
+                board_shape: fitted.board_shape,
+            })
+        },
+    },
+    Contender {
+        name: "joint",
+        title: "ray field, joint",
+        fit: fit_joint,
+        fold: |training| estimate_joint(training).map_err(|error| Failure(error.to_string())),
+    },
+];
+
+/// The baseline. Its residuals count as the joint estimate's do, so that outliers decide for nobody.
+fn fit_pinhole(observations: &Observations, names: &[String]) -> Result<Fitted, Failure> {
+    let failure = |error: PinholeError| Failure(error.to_string());
+    let settings = RigSettings {
+        adjustment: Settings {
+            loss: Loss::StudentT,
+            ..Settings::default()
+        },
+        ..RigSettings::default()
+    };
+    let pinhole = calibrate_rig(observations, &settings).map_err(failure)?;
+    let found = pinhole.rig(names, observations).map_err(failure)?;
+    Ok(Fitted {
+        rig: found.rig,
+        rig_from_board: found.rig_from_board,
+        board_shape: BoardShape::default(),
+        is_used: pinhole.is_used,
+        conversion_error_px: found.worst_error_px,
+    })
+}
+
+fn fit_joint(shared: &Shared, names: &[String]) -> Result<Fitted, Failure> {
+    let estimate = shared
+        .joint
+        .as_ref()
+        .map_err(|error| Failure(chain(error)))?;
+    let is_used = estimate.robust_weights.iter();
+    Ok(Fitted {
+        rig: estimate.rig(names),
+        rig_from_board: estimate.rig_from_board().into_iter().map(Some).collect(),
+        board_shape: estimate.model.board_shape.clone(),
+        is_used: is_used
+            .map(|weights| weights.iter().map(|weight| *weight > 0.0).collect())
+            .collect(),
+        conversion_error_px: 0.0,
+    })
+}
+
+/// An error and its innermost cause.
+fn chain(error: &Error) -> String {
+    let mut cause: &dyn std::error::Error = error;
+    while let Some(inner) = cause.source() {
+        cause = inner;
+    }
+    cause.to_string()
+}
