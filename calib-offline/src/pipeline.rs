@@ -5,7 +5,7 @@
 //! once more; held-out boards and the calibration itself judge it; the record says all of it.
 
 pub mod alternatingly;
-mod jointly;
+pub mod jointly;
 mod left_out;
 pub mod solution;
 mod summary;

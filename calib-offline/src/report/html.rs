@@ -6,6 +6,7 @@ use super::left_out_page;
 use super::plot::{
     Figure, cost, coverage, histogram, pose_rms, residual_vectors, scene, uncertainty_map,
 };
+use super::procedure;
 use super::record::{Calibration, HeldOutRecord};
 use super::text::short;
 use super::words;
@@ -70,6 +71,7 @@ pub fn page(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
                     (verdict(&facts))
                     (headline(calibration, &facts, blob))
                     (figures(calibration))
+                    (procedure::draw(calibration))
                     (choices_page::draw(calibration))
                     (left_out_page::draw(calibration))
                     (provenance(calibration))

@@ -5,6 +5,7 @@ pub mod facts;
 pub mod html;
 pub mod left_out_page;
 pub mod plot;
+mod procedure;
 pub mod record;
 pub mod store;
 pub mod text;

@@ -2,6 +2,7 @@
 
 use super::facts::Facts;
 use super::html::BlobFacts;
+use super::procedure;
 use super::record::Calibration;
 use super::words;
 use std::fmt::Write as _;
@@ -22,6 +23,7 @@ pub fn summary(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
             facts.corners_rejected
         ),
     ));
+    lines.extend(procedure::facts(calibration));
     if let Some(checks) = &calibration.checks {
         lines.push(("half-data check", words::half_data(&checks.half_data)));
     }

@@ -1,7 +1,7 @@
 use super::*;
-use crate::error::UsageError;
 use crate::cli::settings::{Narration, Settings};
 use crate::dataset::{CornersError, SufficiencyError};
+use crate::error::UsageError;
 use crate::report::example;
 use std::fs;
 
