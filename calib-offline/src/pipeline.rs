@@ -11,6 +11,7 @@ pub mod solution;
 mod summary;
 
 use crate::adjust::Observations;
+use crate::alternating::rays::RaySource;
 use crate::dataset::corners::{load_corners, poses};
 use crate::dataset::split::{Selection, without_excluded};
 use crate::dataset::sufficiency::{SufficiencyError, check_sufficiency};
@@ -21,6 +22,7 @@ use crate::detect::{self, DetectSettings};
 use crate::error::{DATA_UNDETERMINED, Error, UsageError};
 use crate::evaluate::verdict::Thresholds;
 use crate::evaluate::{Folds, held_out};
+use crate::field::RayTable;
 use crate::progress::Progress;
 use crate::report::Calibration;
 use alternatingly::alternating_solution;
@@ -59,6 +61,8 @@ pub struct CalibrateSettings {
     pub thresholds: Thresholds,
     /// How images are searched, if the dataset has no corners.
     pub detect: DetectSettings,
+    /// Whether a table with one ray per pixel is made of every camera.
+    pub ray_tables: bool,
 }
 
 impl Default for CalibrateSettings {
@@ -68,6 +72,7 @@ impl Default for CalibrateSettings {
             folds: 5,
             thresholds: Thresholds::default(),
             detect: DetectSettings::default(),
+            ray_tables: false,
         }
     }
 }
@@ -112,6 +117,27 @@ pub struct Checked {
     pub offered: Observations,
     /// The estimates of the held-out check, for whoever wants to measure with them.
     pub folds: Folds,
+    /// One ray per pixel as the method has them; `None` where it has fields.
+    pub ray_sources: Option<Vec<RaySource>>,
+}
+
+/// A calibration, and what else was asked for.
+#[derive(Debug)]
+pub struct Calibrated {
+    /// The calibration.
+    pub calibration: Calibration,
+    /// One ray per pixel of each camera, in the rig's order; empty unless asked for. Those of the
+    /// published procedure are its own, before they are smoothed into the calibration's field.
+    pub ray_tables: Vec<RayTable>,
+}
+
+impl From<Calibration> for Calibrated {
+    fn from(calibration: Calibration) -> Self {
+        Self {
+            calibration,
+            ray_tables: Vec::new(),
+        }
+    }
 }
 
 /// Calibrates a dataset.
@@ -125,10 +151,29 @@ pub fn calibrate(
     dataset: &Dataset,
     settings: &CalibrateSettings,
     progress: &dyn Progress,
-) -> Result<Calibration, Error> {
+) -> Result<Calibrated, Error> {
     let corners = corners(dataset, &settings.detect, progress)?;
     let checked = calibrate_corners(dataset, &corners, settings, progress)?;
-    Ok(checked.calibration)
+    let mut calibrated = Calibrated::from(checked.calibration);
+    if settings.ray_tables {
+        let cameras = &calibrated.calibration.rig.cameras;
+        progress.begin("ray tables", cameras.len());
+        calibrated.ray_tables = cameras
+            .iter()
+            .enumerate()
+            .map(|(camera_idx, camera)| {
+                let sources = checked.ray_sources.as_ref();
+                let table = match sources.and_then(|sources| sources.get(camera_idx)) {
+                    Some(source) => source.table(camera.field.sensor),
+                    None => RayTable::of_camera(camera),
+                };
+                progress.advance();
+                table
+            })
+            .collect();
+        progress.end();
+    }
+    Ok(calibrated)
 }
 
 /// [`calibrate`] from corners that are there already; keeps what the check was made from.
@@ -175,6 +220,7 @@ pub fn calibrate_corners(
         calibration,
         offered: observations,
         folds,
+        ray_sources: solution.ray_sources,
     })
 }
 

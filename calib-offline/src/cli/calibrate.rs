@@ -7,7 +7,7 @@ use crate::atomic_file::{make_folder, write_set};
 use crate::dataset::Dataset;
 use crate::error::Error;
 use crate::pack::{PackSettings, pack_nearest};
-use crate::pipeline::{CalibrateSettings, Method};
+use crate::pipeline::{CalibrateSettings, Calibrated, Method};
 use crate::progress::Progress;
 use crate::report::facts::Facts;
 use crate::report::record::Grade;
@@ -25,6 +25,10 @@ const FORMATS: &str = "\
 DATASET is a folder with dataset.toml and corners.csv or images; corners win. The output folder is
 made if need be and then holds calibration.json (every number), rig.rays (the blob for the device)
 and report.html. Results that stand there already are replaced only with --force.
+
+With --ray-tables it holds rays_NAME.npy too: for each pixel (row, column) six numbers in double
+precision, a point of its ray nearest to the camera (mm) and the unit direction into the scene, both in the
+rig's frame; NaN where there is no ray. Those of --method alternating are its own, pixel by pixel.
 
 With --json: schema calib-offline/calibrate/1, verdict, reasons, held_out_*, half_data_mm and
 half_data_ratio (points of two calibrations from half of the poses: RMS difference, and over what was
@@ -59,6 +63,9 @@ pub struct CalibrateArgs {
     /// Seed of everything drawn at random
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// Write one ray per pixel of each camera too: rays_NAME.npy
+    #[arg(long)]
+    pub ray_tables: bool,
     /// Replace results that stand in the output folder
     #[arg(long)]
     pub force: bool,
@@ -66,7 +73,7 @@ pub struct CalibrateArgs {
 
 /// What estimates: `pipeline::calibrate`, or a stand-in in tests.
 pub type Estimate<'a> =
-    &'a dyn Fn(&Dataset, &CalibrateSettings, &dyn Progress) -> Result<Calibration, Error>;
+    &'a dyn Fn(&Dataset, &CalibrateSettings, &dyn Progress) -> Result<Calibrated, Error>;
 
 /// A calibration and where its files are.
 #[derive(Debug)]
@@ -102,9 +109,19 @@ pub fn run(
 ) -> Result<Outcome, Error> {
     check_results_folder(&args.output, &FILES, args.force)?;
     let mut dataset = Dataset::load(&args.dataset)?;
+    if args.ray_tables {
+        let names: Vec<String> = dataset
+            .cameras
+            .iter()
+            .map(|c| table_name(&c.name))
+            .collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        check_results_folder(&args.output, &names, args.force)?;
+    }
     dataset.excluded_poses.extend(&args.exclude);
     let settings = CalibrateSettings {
         method: args.method,
+        ray_tables: args.ray_tables,
         ..CalibrateSettings::default()
     };
     let written = calibrate_into(&args.output, &dataset, &settings, console, estimate)?;
@@ -142,8 +159,13 @@ pub fn calibrate_into(
     estimate: Estimate<'_>,
 ) -> Result<Written, Error> {
     say_what_is_used(dataset, console);
-    let calibration = estimate(dataset, settings, console.progress())?;
-    write_results(folder, calibration, console)
+    let calibrated = estimate(dataset, settings, console.progress())?;
+    write_results(folder, calibrated, console)
+}
+
+/// Name of the file with a camera's rays.
+fn table_name(camera: &str) -> String {
+    format!("rays_{camera}.npy")
 }
 
 /// Says so if there are images that nobody looks at.
@@ -159,9 +181,13 @@ pub fn say_what_is_used(dataset: &Dataset, console: &Console) {
 /// [`Error`], with nothing written.
 pub fn write_results(
     folder: &Path,
-    calibration: Calibration,
+    calibrated: Calibrated,
     console: &Console,
 ) -> Result<Written, Error> {
+    let Calibrated {
+        calibration,
+        ray_tables,
+    } = calibrated;
     console.progress().begin("packing the blob", 0);
     let packed = pack_nearest(
         &calibration.rig,
@@ -183,7 +209,21 @@ pub fn write_results(
     let existed = folder.exists();
     make_folder(folder)?;
     let contents = [json.as_slice(), packed.bytes.as_slice(), page.as_bytes()];
-    let set: Vec<(PathBuf, &[u8])> = files.iter().cloned().zip(contents).collect();
+    let cameras = calibration.rig.cameras.iter();
+    let tables: Vec<(PathBuf, Vec<u8>)> = cameras
+        .zip(&ray_tables)
+        .map(|(camera, table)| (folder.join(table_name(&camera.name)), table.to_npy()))
+        .collect();
+    let set: Vec<(PathBuf, &[u8])> = files
+        .iter()
+        .cloned()
+        .zip(contents)
+        .chain(
+            tables
+                .iter()
+                .map(|(path, bytes)| (path.clone(), &bytes[..])),
+        )
+        .collect();
     if let Err(error) = write_set(&set) {
         if !existed {
             // Only if it is empty, and only the innermost: then it is the one just made.

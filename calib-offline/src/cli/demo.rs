@@ -139,8 +139,9 @@ fn run_dataset(
         calibration,
         offered,
         folds,
+        ..
     } = pipeline::calibrate_corners(&dataset, &corners, &settings, console.progress())?;
-    let written = write_results(place, calibration, console)?;
+    let written = write_results(place, calibration.into(), console)?;
     console.progress().begin("measuring with the blob", 0);
     let measured = measure(folder, &written, &folds, &offered);
     console.progress().end();

@@ -78,6 +78,7 @@ pub fn alternating_solution(
             costs: found.alternated.rms_mm,
             choices: None,
             alternating: Some(record),
+            ray_sources: Some(found.cameras),
             checks: None,
         },
         folds,

@@ -73,6 +73,7 @@ pub fn joint_solution(
             settled: is_settled,
             choices: Some(choices),
             alternating: None,
+            ray_sources: None,
             checks: Some(checks),
         },
         folds,

@@ -2,6 +2,7 @@
 
 use super::Method;
 use crate::adjust::Observations;
+use crate::alternating::rays::RaySource;
 use crate::board::BoardShape;
 use crate::dataset::sufficiency::MIN_POSES;
 use crate::evaluate::{CrossChecks, Folds};
@@ -52,6 +53,8 @@ pub struct Solution {
     pub choices: Option<ChoicesRecord>,
     /// How the published procedure went, if it was that.
     pub alternating: Option<AlternatingRecord>,
+    /// One ray per pixel and camera as the method has them; `None` where it has a field.
+    pub ray_sources: Option<Vec<RaySource>>,
     /// Checks of the calibration against itself, where the method has them.
     pub checks: Option<CrossChecks>,
 }

@@ -35,6 +35,7 @@ fn args(folder: &Path) -> CalibrateArgs {
         method: Method::Joint,
         exclude: vec![3, 17],
         seed: 1,
+        ray_tables: false,
         force: false,
     }
 }
@@ -47,7 +48,7 @@ fn all_three_files_are_written_and_belong_together() {
     let excluded = std::cell::RefCell::new(Vec::<usize>::new());
     let estimate = |dataset: &Dataset, _: &CalibrateSettings, _: &dyn Progress| {
         excluded.borrow_mut().extend(&dataset.excluded_poses);
-        Ok(example::calibration())
+        Ok(example::calibration().into())
     };
     assert_eq!(run(&args, &console(), &estimate).unwrap(), Outcome::Done);
     assert_eq!(excluded.into_inner(), [3, 17]);
@@ -74,7 +75,10 @@ fn all_three_files_are_written_and_belong_together() {
         force: true,
         ..args
     };
-    run(&forced, &console(), &|_, _, _| Ok(example::calibration())).unwrap();
+    run(&forced, &console(), &|_, _, _| {
+        Ok(example::calibration().into())
+    })
+    .unwrap();
     assert_eq!(fs::read(forced.output.join("report.html")).unwrap(), before);
 }
 
@@ -93,7 +97,7 @@ fn a_failed_verdict_is_written_and_told() {
     let args = args(folder.path());
     let mut calibration = example::calibration();
     calibration.verdict.grade = Grade::Fail;
-    let outcome = run(&args, &console(), &|_, _, _| Ok(calibration.clone())).unwrap();
+    let outcome = run(&args, &console(), &|_, _, _| Ok(calibration.clone().into())).unwrap();
     assert_eq!(outcome, Outcome::VerdictFail);
     assert!(args.output.join("report.html").is_file());
 }
@@ -113,7 +117,7 @@ fn an_estimate_that_fails_leaves_no_folder() {
     // A result that cannot be packed leaves none either.
     let mut empty = example::calibration();
     empty.rig.cameras[0].coverage.covered.fill(false);
-    let error = run(&args, &console(), &|_, _, _| Ok(empty.clone())).unwrap_err();
+    let error = run(&args, &console(), &|_, _, _| Ok(empty.clone().into())).unwrap_err();
     assert_eq!(error.exit_code(), 3);
     assert!(!folder.path().join("deep").exists());
 }
