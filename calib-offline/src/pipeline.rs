@@ -13,7 +13,7 @@ mod summary;
 use crate::adjust::Observations;
 use crate::alternating::rays::RaySource;
 use crate::dataset::corners::{load_corners, poses};
-use crate::dataset::split::{Selection, without_excluded};
+use crate::dataset::split::without_excluded;
 use crate::dataset::sufficiency::{SufficiencyError, check_sufficiency};
 use crate::dataset::{Dataset, View, stage};
 use crate::detect::suspicion::suspicious_labels;
@@ -186,16 +186,10 @@ pub fn calibrate_corners(
     settings: &CalibrateSettings,
     progress: &dyn Progress,
 ) -> Result<Checked, Error> {
-    let selection = selected(dataset, corners)?;
-    // Labels that contradict each other are looked for only where they would explain a failure.
-    let explained = |error: Error| match suspicious_labels(dataset, &selection.used) {
-        Some(suspicion) if error.exit_code() == DATA_UNDETERMINED => Error::Labels {
-            suspicion,
-            source: Box::new(error),
-        },
-        _ => error,
-    };
-    let observations = observed(dataset, &selection);
+    let Offered {
+        views,
+        observations,
+    } = offered(dataset, corners)?;
     let names = camera_names(dataset);
     let all_poses = poses(&corners.views);
     let task = Task {
@@ -207,7 +201,7 @@ pub fn calibrate_corners(
         Method::Joint => joint_solution(&observations, &task, progress),
         Method::Alternating => alternating_solution(&observations, &task, progress),
     };
-    let Solved { solution, folds } = found.map_err(explained)?;
+    let Solved { solution, folds } = found.map_err(|error| explained(error, dataset, &views))?;
     let calibration = summary::record(&summary::Parts {
         dataset,
         corners,
@@ -224,30 +218,49 @@ pub fn calibrate_corners(
     })
 }
 
+/// What a dataset offers to any method.
+#[derive(Debug)]
+pub struct Offered {
+    /// As the dataset has them.
+    pub views: Vec<View>,
+    /// Arranged for adjustment.
+    pub observations: Observations,
+}
+
 /// What a dataset offers to any method: its corners without the poses that the user leaves out.
 ///
 /// # Errors
 /// A pose to leave out that is none; too few corners.
-pub fn offered(dataset: &Dataset, corners: &Corners) -> Result<Observations, Error> {
-    Ok(observed(dataset, &selected(dataset, corners)?))
+pub fn offered(dataset: &Dataset, corners: &Corners) -> Result<Offered, Error> {
+    check_excluded(dataset, &corners.views)?;
+    let views = without_excluded(corners.views.clone(), &dataset.excluded_poses).used;
+    check_sufficiency(dataset, &views)
+        .map_err(|error| with_refusals(dataset, error, corners.detection.as_ref()))?;
+    let sensors = dataset.cameras.iter().map(|camera| camera.sensor).collect();
+    Ok(Offered {
+        observations: Observations::new(dataset.board, sensors, &views),
+        views,
+    })
+}
+
+/// An error, with labels that contradict each other if they explain it: they are looked for only where
+/// the data determined no answer.
+pub fn explained(error: Error, dataset: &Dataset, used: &[View]) -> Error {
+    if error.exit_code() != DATA_UNDETERMINED {
+        return error;
+    }
+    match suspicious_labels(dataset, used) {
+        Some(suspicion) => Error::Labels {
+            suspicion,
+            source: Box::new(error),
+        },
+        None => error,
+    }
 }
 
 /// Names of the cameras, in order.
 pub fn camera_names(dataset: &Dataset) -> Vec<String> {
     dataset.cameras.iter().map(|c| c.name.clone()).collect()
-}
-
-fn selected(dataset: &Dataset, corners: &Corners) -> Result<Selection, Error> {
-    check_excluded(dataset, &corners.views)?;
-    let selection = without_excluded(corners.views.clone(), &dataset.excluded_poses);
-    check_sufficiency(dataset, &selection.used)
-        .map_err(|error| with_refusals(dataset, error, corners.detection.as_ref()))?;
-    Ok(selection)
-}
-
-fn observed(dataset: &Dataset, selection: &Selection) -> Observations {
-    let sensors = dataset.cameras.iter().map(|camera| camera.sensor).collect();
-    Observations::new(dataset.board, sensors, &selection.used)
 }
 
 /// Every pose that is left out must be one: a slip in a number would leave the bad pose in.

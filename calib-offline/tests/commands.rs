@@ -80,6 +80,7 @@ fn every_help_starts_with_an_example() {
     }
     for verb in [
         "calibrate",
+        "compare",
         "demo",
         "detect",
         "inspect",
@@ -108,6 +109,9 @@ fn wrong_arguments_are_exit_code_2() {
         &["calibrate", "set"],
         &["calibrate", "set", "-o", "out", "--exclude", "three"],
         &["measure", "a", "b", "-o", "c", "--frme", "left"],
+        &["compare", "set", "--folds", "1"],
+        &["compare", "set", "--folds", "-3"],
+        &["compare"],
         &["inspect", "x", "-q", "-v"],
     ] {
         run(folder.path(), arguments).assert_code(2);

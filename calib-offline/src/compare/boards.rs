@@ -2,13 +2,14 @@
 //! refuses the difficult part of the image would else look the better for it.
 
 use crate::adjust::Observations;
-use crate::adjust::observations::ViewBlock;
+use crate::adjust::observations::{ObservedCorner, ViewBlock};
 use crate::dataset::Corner;
 use crate::evaluate::held_out::{BoardErrors, Fold, measure_boards};
 use crate::evaluate::resection::residuals_with_free_pose;
 use crate::field::Rig;
 use crate::geometry::PixelPoint;
 use crate::matches::source::RigSource;
+use nalgebra::Vector2;
 
 /// Errors of one method on one board.
 #[derive(Debug, Clone, Default)]
@@ -106,7 +107,7 @@ fn score_board(folds: &[&Fold], board: &Observations) -> Vec<BoardScore> {
         })
         .collect();
     for view in &board.views {
-        let corners: Vec<Corner> = view.corners.iter().map(|c| c.labelled()).collect();
+        let corners: Vec<Corner> = view.corners.iter().map(ObservedCorner::labelled).collect();
         let residuals: Option<Vec<_>> = folds
             .iter()
             .map(|fold| {
@@ -118,8 +119,67 @@ fn score_board(folds: &[&Fold], board: &Observations) -> Vec<BoardScore> {
         for (score, residuals) in scores.iter_mut().zip(residuals.into_iter().flatten()) {
             score
                 .residuals_px
-                .extend(residuals.iter().map(|r| r.norm()));
+                .extend(residuals.iter().map(Vector2::norm));
         }
     }
     scores
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::board::BoardShape;
+    use crate::pinhole::{RigSettings, calibrate_rig};
+    use crate::simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
+
+    #[test]
+    fn a_method_gains_nothing_by_refusing_a_part_of_the_image() {
+        let mut settings = SceneSettings::standard_noisy(OpticsKind::Brown, 3);
+        (settings.board.rows, settings.board.cols) = (7, 6);
+        settings.board.square_mm = 22.0;
+        settings.angles_deg = (-3..=3).map(|k| f64::from(k) * 13.0).collect();
+        let scene = Scene::new(settings).unwrap();
+        let sensors = scene.cameras.iter().map(CameraOptics::sensor).collect();
+        let seen = Observations::new(scene.settings.board, sensors, &scene.observe_corners());
+        let pinhole = calibrate_rig(&seen, &RigSettings::default()).unwrap();
+        let rig = pinhole.rig(&seen.numbered_cameras(), &seen).unwrap().rig;
+        let whole = Fold {
+            rig,
+            board_shape: BoardShape::default(),
+            unseen: seen.clone(),
+        };
+        let mut half = whole.clone();
+        let coverage = &mut half.rig.cameras[0].coverage;
+        for (k, covered) in coverage.covered.iter_mut().enumerate() {
+            *covered &= k % coverage.cells_u < coverage.cells_u / 2;
+        }
+
+        let alone = score_fold(&[&whole]);
+        assert_eq!(alone.unanswered, [0]);
+        assert_eq!(alone.common_count, seen.corner_count());
+        let both = score_fold(&[&whole, &half]);
+        let refused = both.unanswered[1];
+        assert_eq!(both.unanswered[0], 0);
+        assert!(refused > 20, "{refused}");
+        assert_eq!(both.common_count, seen.corner_count() - refused);
+        assert_eq!(both.boards.len(), seen.poses.len());
+        let mut points = 0;
+        for board in &both.boards {
+            // The same rig on the same corners: the same errors.
+            assert_eq!(board[0].residuals_px, board[1].residuals_px);
+            assert_eq!(
+                board[0].boards.neighbor_errors,
+                board[1].boards.neighbor_errors
+            );
+            points += board[0].boards.point_count;
+        }
+        let all: usize = alone.boards.iter().map(|b| b[0].boards.point_count).sum();
+        assert!(points > 0 && points < all, "{points} of {all}");
+    }
+
+    #[test]
+    fn without_methods_nothing_is_scored() {
+        let scores = score_fold(&[]);
+        assert_eq!((scores.boards.len(), scores.corner_count), (0, 0));
+    }
 }

@@ -20,10 +20,10 @@ use crate::evaluate::truth::{PointWithTruth, compare_with_truth};
 use crate::evaluate::{Folds, estimate_folds, rms};
 use crate::field::Rig;
 use crate::geometry::RigidTransform;
-use crate::matches::read_known;
 use crate::matches::source::{PointSource, RigSource};
+use crate::matches::{KnownMatches, read_known};
 use crate::pipeline::solution::folds_wanted;
-use crate::pipeline::{Corners, camera_names, offered};
+use crate::pipeline::{Corners, camera_names, explained, offered};
 use crate::progress::Progress;
 use boards::{BoardScore, FoldScores, score_fold};
 use contender::{CONTENDERS, Contender, Failure, Fitted, Shared};
@@ -54,9 +54,15 @@ pub fn compare(
 ) -> Result<Comparison, Error> {
     let offered = offered(dataset, corners)?;
     let names = camera_names(dataset);
+    // One camera measures no points.
+    let known = if names.len() < 2 {
+        Vec::new()
+    } else {
+        read_known(&dataset.folder, &names)?
+    };
     progress.begin("screening", 0);
     let began = Instant::now();
-    let shared = Shared::of(&offered);
+    let shared = Shared::of(&offered.observations);
     let joint_time = began.elapsed();
     progress.end();
     let observations = &shared.observations;
@@ -73,7 +79,7 @@ pub fn compare(
     if runs.iter().all(|run| run.fitted.is_err())
         && let Err(error) = shared.joint
     {
-        return Err(error);
+        return Err(explained(error, dataset, &offered.views));
     }
     let mut methods: Vec<MethodFigures> = runs.iter().map(figures).collect();
     for (run, figures) in runs.iter().zip(&mut methods) {
@@ -87,7 +93,7 @@ pub fn compare(
     }
     add_training(&mut methods, &runs, observations);
     let held_out = add_held_out(&mut methods, &runs, folds, observations.board.square_mm);
-    add_truth(&mut methods, &runs, dataset)?;
+    add_truth(&mut methods, &runs, &known);
     let best = runs.iter().rev().find_map(|run| run.fitted.as_ref().ok());
     let mut comparison = Comparison {
         schema: SCHEMA,
@@ -303,15 +309,12 @@ fn ratios(own: &[&BoardScore], first: &[&BoardScore]) -> Ratios {
 }
 
 /// Points of matches whose truth is known, where every method has one.
-fn add_truth(methods: &mut [MethodFigures], runs: &[Run], dataset: &Dataset) -> Result<(), Error> {
-    if dataset.cameras.len() < 2 {
-        return Ok(());
-    }
+fn add_truth(methods: &mut [MethodFigures], runs: &[Run], known: &[KnownMatches<f64>]) {
     let rigs: Vec<Option<&Rig>> = runs
         .iter()
         .map(|run| run.fitted.as_ref().ok().map(|fitted| &fitted.rig))
         .collect();
-    for known in read_known::<f64>(&dataset.folder, &camera_names(dataset))? {
+    for known in known {
         let points: Vec<Option<Vec<Option<Vector3<f64>>>>> = rigs
             .iter()
             .map(|rig| {
@@ -341,5 +344,4 @@ fn add_truth(methods: &mut [MethodFigures], runs: &[Run], dataset: &Dataset) -> 
             });
         }
     }
-    Ok(())
 }

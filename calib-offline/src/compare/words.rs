@@ -246,7 +246,7 @@ fn failures(comparison: &Comparison) -> Vec<String> {
 }
 
 #[cfg(test)]
-pub mod tests {
+pub(super) mod tests {
     use super::super::bootstrap::Ratio;
     use super::super::record::{Ratios, SCHEMA, Training, TruthFigures};
     use super::*;
@@ -367,7 +367,7 @@ pub mod tests {
     #[test]
     fn times_are_in_no_file() {
         let mut slower = example();
-        slower.methods[0].time = Duration::from_secs(300);
+        slower.methods[0].time = Duration::from_secs(301);
         let json = |comparison: &Comparison| serde_json::to_string(comparison).unwrap();
         assert_eq!(json(&slower), json(&example()));
     }

@@ -86,7 +86,7 @@ fn estimate_never(
     _: &Dataset,
     _: &CalibrateSettings,
     _: &dyn Progress,
-) -> Result<Calibration, Error> {
+) -> Result<Calibrated, Error> {
     panic!("refused too late")
 }
 

@@ -1,0 +1,172 @@
+//! `compare`, driven as a user drives it, on simulated recordings.
+
+mod common;
+
+use common::{MANIFEST, contents, corners_csv, dataset, run};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+/// A small recording: 14 poses of 42 corners before two cameras.
+fn simulate(folder: &Path, optics: &str) {
+    let size = ["--rows", "7", "--cols", "6", "--square-mm", "22"];
+    let shots = ["--angles=-39:13:39", "--points", "200", "--holdout", "200"];
+    let start = ["simulate", "-o", "set", "--optics", optics, "--seed", "3"];
+    run(folder, &[&start[..], &size, &shots].concat()).assert_code(0);
+}
+
+fn method<'a>(object: &'a Value, name: &str) -> &'a Value {
+    let methods = object["methods"].as_array().unwrap();
+    methods.iter().find(|m| m["method"] == name).unwrap()
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value}"))
+}
+
+#[test]
+fn behind_a_port_the_ray_field_gains_and_the_files_say_so() {
+    let folder = tempfile::tempdir().unwrap();
+    simulate(folder.path(), "port");
+    let arguments = ["compare", "set", "-o", "out", "--json"];
+    let first = run(folder.path(), &arguments);
+    let object = first.assert_code(0).json();
+    assert_eq!(object["schema"], "calib-offline/compare/1");
+    assert_eq!(
+        (&object["poses"], &object["folds"]),
+        (&14.into(), &5.into())
+    );
+    let (pinhole, joint) = (method(&object, "pinhole"), method(&object, "joint"));
+    for own in [pinhole, joint] {
+        assert!(own["failure"].is_null());
+        assert_eq!(own["truth"].as_array().unwrap().len(), 2);
+        // Both from the same corners.
+        assert_eq!(own["training"]["corners"], joint["training"]["corners"]);
+        assert_eq!(own["held_out"]["points"], joint["held_out"]["points"]);
+    }
+    assert!(number(&pinhole["conversion_error_px"]) < 1e-4);
+    // Noise of 0.05 px per axis.
+    let fitted = number(&joint["training"]["rms_px"]);
+    assert!((0.06..0.08).contains(&fitted), "{fitted}");
+    assert!(number(&pinhole["training"]["rms_px"]) > 1.3 * fitted);
+    let rigid = &joint["against_first"]["rigid"];
+    assert!(number(&rigid["low"]) < number(&rigid["ratio"]));
+    assert!(number(&rigid["high"]) < 0.95, "{rigid}");
+    assert!(pinhole["against_first"].is_null());
+    let ratio = |own: &Value| number(&own["truth"][0]["errors"]["placed_ratio"]);
+    assert!(
+        ratio(joint) < 1.2 && ratio(pinhole) > 1.5,
+        "{} {}",
+        ratio(joint),
+        ratio(pinhole)
+    );
+    let conclusion = object["conclusion"].to_string();
+    assert!(
+        conclusion.contains("A pinhole is not enough here"),
+        "{conclusion}"
+    );
+
+    let out = folder.path().join("out");
+    let json: Value =
+        serde_json::from_slice(&fs::read(out.join("comparison.json")).unwrap()).unwrap();
+    assert_eq!(json, object);
+    let csv = fs::read_to_string(out.join("comparison.csv")).unwrap();
+    let fields: Vec<usize> = csv.lines().map(|line| line.split(',').count()).collect();
+    assert_eq!(fields, [27, 27, 27], "{csv}");
+    let page = fs::read_to_string(out.join("comparison.md")).unwrap();
+    assert!(page.contains("| ray field, joint |") && page.contains("- A pinhole is not enough"));
+
+    // Nothing is replaced unasked, and what is written again has the same bytes.
+    let before = contents(folder.path());
+    run(folder.path(), &arguments)
+        .assert_code(2)
+        .assert_says(&["exists", "--force"]);
+    let again = [&arguments[..], &["--force", "--threads", "1"]].concat();
+    run(folder.path(), &again).assert_code(0);
+    assert_eq!(contents(folder.path()), before);
+}
+
+#[test]
+fn in_air_a_pinhole_is_enough() {
+    let folder = tempfile::tempdir().unwrap();
+    simulate(folder.path(), "brown");
+    let found = run(folder.path(), &["compare", "set", "-v"]);
+    found.assert_code(0).assert_says(&["s with its folds"]);
+    assert!(
+        found.stdout.contains("A pinhole is enough here"),
+        "{}",
+        found.stdout
+    );
+    assert!(!found.stdout.contains("s with its folds"));
+    assert!(found.stdout.contains("matches mm (oracle)"));
+}
+
+#[test]
+fn one_camera_alone_is_compared_by_its_residuals() {
+    let folder = tempfile::tempdir().unwrap();
+    simulate(folder.path(), "brown");
+    let set = folder.path().join("set");
+    let manifest = fs::read_to_string(set.join("dataset.toml")).unwrap();
+    let mut cameras: Vec<&str> = manifest.split("[[camera]]").collect();
+    let right = cameras
+        .iter()
+        .position(|part| part.contains("\"right\""))
+        .unwrap();
+    // Whatever follows the camera's own keys stays.
+    let rest = cameras[right]
+        .find("\n[")
+        .map_or("", |at| &cameras[right][at..]);
+    let rest = rest.to_owned();
+    cameras.remove(right);
+    fs::write(set.join("dataset.toml"), cameras.join("[[camera]]") + &rest).unwrap();
+    let corners = fs::read_to_string(set.join("corners.csv")).unwrap();
+    let left: Vec<&str> = corners
+        .lines()
+        .filter(|line| !line.starts_with("right"))
+        .collect();
+    fs::write(set.join("corners.csv"), left.join("\n")).unwrap();
+    let found = run(folder.path(), &["compare", "set", "--json"]);
+    let object = found.assert_code(0).json();
+    for name in ["pinhole", "joint"] {
+        let own = method(&object, name);
+        assert!(number(&own["held_out"]["rms_px"]) < 0.1, "{own}");
+        assert!(own["held_out"]["neighbor_rms_mm"].is_null());
+        assert_eq!(own["truth"], Value::Array(Vec::new()));
+    }
+    assert!(object["conclusion"].to_string().contains("residual"));
+}
+
+#[test]
+fn too_few_poses_for_folds_are_said() {
+    let folder = dataset(MANIFEST, corners_csv(5).as_bytes());
+    let found = run(folder.path(), &["compare", "set"]);
+    found.assert_code(0);
+    for part in ["no held-out boards", "not compared on boards it never saw"] {
+        assert!(found.stdout.contains(part), "{}", found.stdout);
+    }
+}
+
+#[test]
+fn a_damaged_table_of_true_points_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    simulate(folder.path(), "brown");
+    let truth = folder.path().join("set/matches_truth.csv");
+    let text = fs::read_to_string(&truth).unwrap();
+    for (content, words) in [
+        (
+            text.lines().take(9).collect::<Vec<_>>().join("\n"),
+            "has 8 rows, its matches 200",
+        ),
+        (
+            text.replacen("x_oracle", "oracle", 1),
+            "is no table of true points",
+        ),
+        (String::new(), "has 0 rows"),
+    ] {
+        fs::write(&truth, content).unwrap();
+        run(folder.path(), &["compare", "set", "-o", "out"])
+            .assert_code(2)
+            .assert_says(&["matches_truth.csv", words, "try: "]);
+        assert!(!folder.path().join("out").exists());
+    }
+}
