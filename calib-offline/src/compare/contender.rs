@@ -2,15 +2,19 @@
 //! one more entry of [`CONTENDERS`].
 
 use crate::adjust::Observations;
+use crate::adjust::robust::{relative_weights, reweight};
 use crate::board::BoardShape;
 use crate::error::Error;
 use crate::evaluate::held_out::Estimated;
+use crate::evaluate::reprojection::residuals;
 use crate::field::Rig;
 use crate::geometry::RigidTransform;
 use crate::init::rig::start_rig;
 use crate::joint::{Estimate, estimate_screened};
 use crate::pinhole::{Loss, PinholeError, RigSettings, Settings, calibrate_rig};
+use crate::pipeline::alternatingly::{estimate_alternating, estimate_rig};
 use crate::pipeline::jointly::estimate_joint;
+use std::collections::BTreeMap;
 
 /// What all methods are given: the views that agree with each other, as the joint estimate finds
 /// them.
@@ -20,18 +24,21 @@ pub struct Shared {
     pub observations: Observations,
     /// The joint estimate that came of it on the way.
     pub joint: Result<Estimate, Error>,
+    /// Stage placement of the poses (by number) that belong to one.
+    pub placements: BTreeMap<usize, usize>,
 }
 
 impl Shared {
     /// Screens the views offered. Where there is no joint estimate they are taken as its start left
     /// them, and without even a start as they were offered.
-    pub fn of(offered: &Observations) -> Self {
+    pub fn of(offered: &Observations, placements: BTreeMap<usize, usize>) -> Self {
         let start = match start_rig(offered) {
             Ok(start) => start,
             Err(error) => {
                 return Self {
                     observations: offered.clone(),
                     joint: Err(error.into()),
+                    placements,
                 };
             }
         };
@@ -40,10 +47,12 @@ impl Shared {
             Ok((estimate, _)) => Self {
                 observations: estimate.observations.clone(),
                 joint: Ok(estimate),
+                placements,
             },
             Err(error) => Self {
                 observations: started,
                 joint: Err(error.into()),
+                placements,
             },
         }
     }
@@ -74,7 +83,7 @@ pub struct Contender {
     /// From everything; the cameras named as given.
     pub fit: fn(&Shared, &[String]) -> Result<Fitted, Failure>,
     /// From some poses. The cameras of its rig are named by number.
-    pub fold: fn(&Observations) -> Result<Estimated, Failure>,
+    pub fold: fn(&Shared, &Observations) -> Result<Estimated, Failure>,
 }
 
 /// Why a method has no answer, in words.
@@ -83,12 +92,12 @@ pub struct Contender {
 pub struct Failure(pub String);
 
 /// The methods, in the order of the table. The first is what the others are measured against.
-pub const CONTENDERS: [Contender; 2] = [
+pub const CONTENDERS: [Contender; 3] = [
     Contender {
         name: "pinhole",
         title: "pinhole, Brown-Conrady",
         fit: |shared, names| fit_pinhole(&shared.observations, names),
-        fold: |training| {
+        fold: |_, training| {
             let fitted = fit_pinhole(training, &training.numbered_cameras())?;
             Ok(Estimated {
                 rig: fitted.rig,
@@ -97,10 +106,19 @@ pub const CONTENDERS: [Contender; 2] = [
         },
     },
     Contender {
+        name: "alternating",
+        title: "rays one by one, alternating",
+        fit: fit_alternating,
+        fold: |shared, training| {
+            estimate_alternating(training, &|pose| shared.placements.get(&pose).copied())
+                .map_err(|error| Failure(error.to_string()))
+        },
+    },
+    Contender {
         name: "joint",
         title: "ray field, joint",
         fit: fit_joint,
-        fold: |training| estimate_joint(training).map_err(|error| Failure(error.to_string())),
+        fold: |_, training| estimate_joint(training).map_err(|error| Failure(error.to_string())),
     },
 ];
 
@@ -123,6 +141,61 @@ fn fit_pinhole(observations: &Observations, names: &[String]) -> Result<Fitted, 
         is_used: pinhole.is_used,
         conversion_error_px: found.worst_error_px,
     })
+}
+
+/// The published procedure. Corners count as used where the joint estimate's weights would keep them.
+fn fit_alternating(shared: &Shared, names: &[String]) -> Result<Fitted, Failure> {
+    let start = start_rig(&shared.observations).map_err(|error| Failure(error.to_string()))?;
+    let placement = |pose| shared.placements.get(&pose).copied();
+    let (found, fields) =
+        estimate_rig(&start, names, &placement).map_err(|error| Failure(error.to_string()))?;
+    let placed = found.poses_by_number();
+    let rig_from_board: Vec<Option<RigidTransform>> = shared
+        .observations
+        .poses
+        .iter()
+        .map(|pose| placed.get(pose).copied())
+        .collect();
+    let board_shape = BoardShape::default();
+    let is_used = used_corners(
+        &fields.rig,
+        &rig_from_board,
+        &board_shape,
+        &shared.observations,
+    );
+    // Of single rays, which carry noise that the field does not.
+    let conversion_error_px = fields.rms_error_px.iter().copied().fold(0.0, f64::max);
+    Ok(Fitted {
+        rig: fields.rig,
+        rig_from_board,
+        board_shape,
+        is_used,
+        conversion_error_px,
+    })
+}
+
+/// Per view and corner: whether its residual is no outlier among those of its like.
+fn used_corners(
+    rig: &Rig,
+    rig_from_board: &[Option<RigidTransform>],
+    board_shape: &BoardShape,
+    observations: &Observations,
+) -> Vec<Vec<bool>> {
+    let poses: Vec<RigidTransform> = rig_from_board
+        .iter()
+        .map(|pose| pose.unwrap_or_else(RigidTransform::identity))
+        .collect();
+    let mut residuals = residuals(rig, &poses, board_shape, observations);
+    for (view, residuals) in observations.views.iter().zip(&mut residuals) {
+        if rig_from_board[view.pose_idx].is_none() {
+            residuals.fill(None);
+        }
+    }
+    let (noise, _) = reweight(&residuals, observations, 1.0, None);
+    relative_weights(&residuals, observations, &noise)
+        .into_iter()
+        .map(|weights| weights.into_iter().map(|weight| weight > 0.0).collect())
+        .collect()
 }
 
 fn fit_joint(shared: &Shared, names: &[String]) -> Result<Fitted, Failure> {

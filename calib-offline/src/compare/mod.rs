@@ -11,8 +11,9 @@ pub mod words;
 pub use record::{Comparison, MethodFigures, SCHEMA};
 
 use crate::adjust::Observations;
-use crate::dataset::Dataset;
+use crate::dataset::corners::poses;
 use crate::dataset::identity::input_sha256;
+use crate::dataset::{Dataset, View, stage};
 use crate::error::Error;
 use crate::evaluate::held_out::{BoardErrors, Fold};
 use crate::evaluate::reprojection::residuals;
@@ -29,6 +30,7 @@ use boards::{BoardScore, FoldScores, score_fold};
 use contender::{CONTENDERS, Contender, Failure, Fitted, Shared};
 use nalgebra::Vector3;
 use record::{HeldOutFigures, Ratios, Training, TruthFigures};
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 /// A method and what came of it.
@@ -62,7 +64,7 @@ pub fn compare(
     };
     progress.begin("screening", 0);
     let began = Instant::now();
-    let shared = Shared::of(&offered.observations);
+    let shared = Shared::of(&offered.observations, placements(dataset, &corners.views));
     let joint_time = began.elapsed();
     progress.end();
     let observations = &shared.observations;
@@ -125,7 +127,8 @@ fn run<'a>(
     let began = Instant::now();
     let fitted = (contender.fit)(shared, names);
     let folds = if fitted.is_ok() { folds } else { 0 };
-    let folds = estimate_folds(&shared.observations, folds, &contender.fold, progress);
+    let fold = |training: &Observations| (contender.fold)(shared, training);
+    let folds = estimate_folds(&shared.observations, folds, &fold, progress);
     Run {
         contender,
         fitted,
@@ -306,6 +309,14 @@ fn ratios(own: &[&BoardScore], first: &[&BoardScore]) -> Ratios {
         neighbor: of(|board| &board.boards.neighbor_errors),
         rigid: of(|board| &board.boards.rigid_errors_mm),
     }
+}
+
+/// Stage placement of the poses that belong to one.
+fn placements(dataset: &Dataset, views: &[View]) -> BTreeMap<usize, usize> {
+    let all = poses(views);
+    all.iter()
+        .filter_map(|pose| Some((*pose, stage::entry(dataset, &all, *pose).placement?)))
+        .collect()
 }
 
 /// Points of matches whose truth is known, where every method has one.

@@ -101,7 +101,11 @@ pub fn estimate_alternating(
     })
 }
 
-fn estimate_rig(
+/// The published procedure from a start, and its cameras as fields.
+///
+/// # Errors
+/// [`AlternatingError`].
+pub fn estimate_rig(
     start: &RigStart,
     names: &[String],
     placement: &dyn Fn(usize) -> Option<usize>,
