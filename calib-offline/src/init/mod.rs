@@ -1,7 +1,8 @@
 //! Initialization: from labelled corners to fields, poses and extrinsics good enough to adjust.
 //!
-//! Zhang's closed form is no starting point here: a rotation about one axis parallel to the board
-//! is a near-critical motion for it, and it knows no distortion. Instead ([`focal_scan`]) each
+//! Zhang's closed form is no starting point for all lenses: it knows no distortion. (That a rotation
+//! about one axis would be near-critical for it was not found: `pinhole::zhang` has the figures.)
+//! Instead ([`focal_scan`]) each
 //! camera tries ideal lenses of many focal lengths and two kinds, places every board by its
 //! bearings ([`bearing_pose`]), and refines the best few with a cubic field; the cameras are then
 //! joined over their common poses ([`rig`]). METHOD section 3. On the way views and pairs of views
