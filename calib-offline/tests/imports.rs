@@ -10,10 +10,10 @@ const LAYERS: [&[&str]; 10] = [
     &["detect", "simulate", "field"],
     &["adjust"],
     &["init"],
-    &["joint", "pinhole"],
+    &["joint", "pinhole", "alternating"],
     &["evaluate", "matches", "pack", "report"],
     &["error"],
-    &["pipeline", "demo"],
+    &["pipeline", "demo", "experiments"],
     &["cli"],
 ];
 

@@ -1,6 +1,6 @@
 //! What can be written on the command line. Each help text starts with an example.
 
-use super::{calibrate, demo, detect, inspect, measure, pack, simulate};
+use super::{calibrate, demo, detect, evaluate, inspect, measure, pack, simulate};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::num::NonZeroUsize;
 
@@ -46,6 +46,8 @@ pub enum Verb {
     Demo(demo::DemoArgs),
     /// Find the board's corners in a dataset's images: corners.csv
     Detect(detect::DetectArgs),
+    /// Run the publication's experiments with three methods: figures, tables, evaluation.json
+    Evaluate(evaluate::EvaluateArgs),
     /// Say what a dataset, a calibration or a blob is
     Inspect(inspect::InspectArgs),
     /// Triangulate matches
