@@ -34,7 +34,7 @@ evaluation.json, and --json: schema calib-offline/evaluate/1, publication (mean_
 comparable), files, evaluations, each with name, dataset, cameras, poses, corners,
   methods       method, placed_poses, failed (why there is nothing of it)
   spread        views, neurons, marker_pairs, best_px, best_left_out_rms_mm,
-                published_choice_left_out_rms_mm
+                alternating_px, published_choice_left_out_rms_mm
   stage_angles  methods: method, rms_deg, wobble_rms_deg, angles (pose, placement, dial_deg, error_deg)
   target        markers, common, cloud_method, methods: method, without_point, errors, neighbor_rms_mm,
                 largest_pose_deviation_mm, poses (pose, distance_mm, errors, neighbor_rms_mm); errors
@@ -95,16 +95,13 @@ struct Publication {
 pub fn run(args: &EvaluateArgs, console: &Console) -> Result<Outcome, Error> {
     check_folder(&args.output)?;
     let settings = ExperimentSettings::default();
-    let evaluations = match &args.dataset {
-        Some(folder) => {
-            let dataset = Dataset::load(folder)?;
-            check_writable(&args.output)?;
-            vec![evaluate(&dataset, &settings, console.progress())?]
-        }
-        None => {
-            check_writable(&args.output)?;
-            evaluate_set_up(&settings, console.progress())?
-        }
+    let evaluations = if let Some(folder) = &args.dataset {
+        let dataset = Dataset::load(folder)?;
+        check_writable(&args.output)?;
+        vec![evaluate(&dataset, &settings, console.progress())?]
+    } else {
+        check_writable(&args.output)?;
+        evaluate_set_up(&settings, console.progress())?
     };
     let words = text(&evaluations);
     let (object, folders) = write_results(&args.output, evaluations, &words, args.paper_set_up)?;

@@ -78,9 +78,17 @@ fn spread_figure(spread: &SpreadExperiment) -> String {
         )]
     };
     let published_mark = || (PUBLISHED_CHOICE_PX, "publication: 6000 px".to_owned());
-    let best_mark = (
-        spread.best_px,
-        format!("least left-out error: {:.0} px", spread.best_px),
+    let mut wide_marks = vec![
+        published_mark(),
+        (
+            spread.best_px,
+            format!("least left-out error: {:.0} px", spread.best_px),
+        ),
+    ];
+    wide_marks.extend(
+        spread
+            .alternating_px
+            .map(|px| (px, format!("alternating takes {px:.0} px *"))),
     );
     let narrow = |title: &str, label: &str, series| Panel {
         title: title.to_owned(),
@@ -91,7 +99,7 @@ fn spread_figure(spread: &SpreadExperiment) -> String {
     };
     let wide = |title: &str, label: &str, series, marks| Panel {
         title: title.to_owned(),
-        x: Axis::logarithmic("spread, px (logarithmic)"),
+        x: Axis::logarithmic("spread, px (logarithmic)  * with a homography before the networks"),
         y: Axis::logarithmic(label),
         series,
         marks,
@@ -106,7 +114,7 @@ fn spread_figure(spread: &SpreadExperiment) -> String {
             "From 100 px on",
             "RMS error on the board, mm (logarithmic)",
             corners(&spread.wide),
-            vec![published_mark(), best_mark],
+            wide_marks,
         ),
     ];
     if spread.marker_pairs > 0 {
@@ -160,8 +168,16 @@ fn stage_figure(stage: &StageExperiment) -> String {
 fn cloud_figure(target: &TargetExperiment) -> String {
     let method = target.cloud_method.map_or("", Method::name);
     let views: [(&str, [&str; 2], [usize; 2]); 2] = [
-        ("Seen along z", ["x, mm", "y, mm"], [0, 1]),
-        ("Seen along y", ["x, mm", "z, mm"], [0, 2]),
+        (
+            "Seen along z",
+            ["x of the datum board, mm", "y of the datum board, mm"],
+            [0, 1],
+        ),
+        (
+            "Seen along y",
+            ["x of the datum board, mm", "z of the datum board, mm"],
+            [0, 2],
+        ),
     ];
     let panels: Vec<Panel> = views
         .iter()

@@ -82,6 +82,8 @@ pub struct Calibrated {
     pub datum_from_board: Vec<(usize, RigidTransform)>,
     /// Where the cameras are, mm.
     pub cameras_in_datum: Vec<Vector3<f64>>,
+    /// Spread of the networks, px, if there are any.
+    pub spread_px: Option<f64>,
 }
 
 impl Calibrated {
@@ -100,6 +102,7 @@ impl Calibrated {
             datum_from_own: RigidTransform::identity(),
             datum_from_board: poses,
             cameras_in_datum: cameras,
+            spread_px: None,
         }
     }
 
@@ -225,12 +228,13 @@ fn alternating(
     let poses = estimate.rig_from_board.clone();
     let places = estimate.rig_from_camera.iter();
     let places = places.map(|camera| camera.translation_mm).collect();
+    let spread_px = Some(estimate.spread.spread_px);
     let numbers = estimate.observations.poses.clone().into_iter();
-    Ok(Calibrated::new(
-        Box::new(estimate),
-        numbers.zip(poses),
-        places,
-    ))
+    let calibrated = Calibrated::new(Box::new(estimate), numbers.zip(poses), places);
+    Ok(Calibrated {
+        spread_px,
+        ..calibrated
+    })
 }
 
 /// Brings all calibrations to the frame of the first pose that all of them placed.

@@ -168,7 +168,8 @@ pub fn evaluate(
     }
 
     progress.begin("networks of many spreads", 0);
-    let spread = spread::run(&observations, scene.as_ref(), settings);
+    let chosen_px = methods::calibrated(&runs).find_map(|(_, calibrated)| calibrated.spread_px);
+    let spread = spread::run(&observations, scene.as_ref(), chosen_px, settings);
     progress.end();
     let spread = noted(&mut left_out, "error against spread", spread);
     if scene.is_none() {

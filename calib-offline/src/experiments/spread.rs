@@ -53,6 +53,8 @@ pub struct SpreadExperiment {
     pub best_px: f64,
     /// The error there, mm.
     pub best_left_out_rms_mm: f64,
+    /// What the alternating method chose, with a homography before its networks, px.
+    pub alternating_px: Option<f64>,
     /// The error at the publication's choice of 6000 px (the nearest spread tried), mm.
     pub published_choice_left_out_rms_mm: f64,
 }
@@ -64,6 +66,7 @@ pub struct SpreadExperiment {
 pub fn run(
     observations: &Observations,
     scene: Option<&Scene>,
+    alternating_px: Option<f64>,
     settings: &ExperimentSettings,
 ) -> Result<SpreadExperiment, String> {
     let views = drawn(observations, settings.views);
@@ -111,6 +114,7 @@ pub fn run(
         published,
         wide,
         best_px: best.spread_px,
+        alternating_px,
         best_left_out_rms_mm: best.left_out_rms_mm,
         published_choice_left_out_rms_mm: choice.left_out_rms_mm,
     })

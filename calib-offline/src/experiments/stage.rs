@@ -111,14 +111,10 @@ fn errors_deg(
     poses: &[(usize, f64, RigidTransform)],
     axis: &Vector3<f64>,
 ) -> Vec<(usize, f64, f64)> {
-    let mut dials: Vec<f64> = poses.iter().map(|(_, dial, _)| *dial).collect();
-    dials.sort_by(f64::total_cmp);
-    let middle = dials.get(dials.len() / 2).copied().unwrap_or(0.0);
+    let mut by_dial: Vec<&(usize, f64, RigidTransform)> = poses.iter().collect();
+    by_dial.sort_by(|a, b| a.1.total_cmp(&b.1));
     // Turns are counted from the middle of the dial: the shortest, and far from half a turn.
-    let Some((_, zero_deg, zero)) = poses
-        .iter()
-        .find(|(_, dial, _)| *dial >= middle && *dial <= middle)
-    else {
+    let Some((_, zero_deg, zero)) = by_dial.get(by_dial.len() / 2) else {
         return Vec::new();
     };
     let turns: Vec<f64> = poses

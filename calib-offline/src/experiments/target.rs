@@ -80,10 +80,13 @@ pub struct TargetExperiment {
     pub cloud: Vec<CloudPoint>,
 }
 
-/// Points per method; the points that all methods have.
+/// The points of a method, one per item, `None` where it has none.
+pub type Points = Vec<Option<Vector3<f64>>>;
+
+/// Points per method, and which of them can be compared.
 pub struct Measured<'a> {
-    /// The methods with a point for each item, `None` where it has none.
-    pub methods: Vec<(Method, &'a Calibrated, Vec<Option<Vector3<f64>>>)>,
+    /// The methods that have a calibration.
+    pub methods: Vec<(Method, &'a Calibrated, Points)>,
     /// Whether every method that measures at all has a point for the item.
     pub is_common: Vec<bool>,
 }

@@ -232,8 +232,8 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, [left, top]: [f64; 2], above: f64) {
     for (k, (value, word)) in panel.marks.iter().enumerate() {
         let [x, _] = axes.at(panel.x.place(*value), y[0]);
         svg.line("mark", [x, axes.down[0]], [x, axes.down[1]]);
-        // Words beside their line, one below the other, towards the middle.
-        let is_right = x > f64::midpoint(axes.across[0], axes.across[1]);
+        // Words beside their line, one below the other, on the side with more room.
+        let is_right = x > axes.across[0] + 0.65 * PLOT[0];
         let (anchor, dx) = if is_right {
             (Anchor::End, -4.0)
         } else {
