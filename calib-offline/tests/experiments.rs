@@ -78,6 +78,15 @@ fn a_simulated_recording_has_every_part_and_joint_is_near_the_oracle() {
         // Markers of 0.002 px measure to micrometers; what is left is the calibration.
         let errors = method.errors.as_ref().unwrap();
         assert!(errors.mean_mm < 0.02, "{:?}: {errors:?}", method.method);
+        // Depth is some three times as uncertain as what a rigid target shows.
+        let true_rms_mm = method.true_rms_mm.unwrap();
+        assert!(true_rms_mm > 0.5 * errors.rms_mm && true_rms_mm < 0.05);
+        let squares = method
+            .poses
+            .iter()
+            .map(|p| p.errors.count as f64 * p.true_rms_mm.unwrap().powi(2));
+        let pooled = (squares.sum::<f64>() / errors.count as f64).sqrt();
+        assert!((pooled - true_rms_mm).abs() < 1e-12);
         let rms = (errors.mean_mm.powi(2) + errors.variance_mm2).sqrt();
         assert!((rms - errors.rms_mm).abs() < 1e-12);
     }

@@ -37,8 +37,8 @@ comparable), files, evaluations, each with name, dataset, cameras, poses, corner
                 alternating_px, published_choice_left_out_rms_mm
   stage_angles  methods: method, rms_deg, wobble_rms_deg, angles (pose, placement, dial_deg, error_deg)
   target        markers, common, cloud_method, methods: method, without_point, errors, neighbor_rms_mm,
-                largest_pose_deviation_mm, poses (pose, distance_mm, errors, neighbor_rms_mm); errors
-                are count, mean_mm, deviation_mm, variance_mm2, rms_mm, worst_mm
+                true_rms_mm, largest_pose_deviation_mm, poses (pose, distance_mm, errors,
+                neighbor_rms_mm, true_rms_mm); errors are count, mean_mm, deviation_mm, variance_mm2, rms_mm, worst_mm
   known_points  matches, common, frame_is_true, methods: method, without_point, errors (points,
                 direct_rms_mm, placed_rms_mm, oracle_rms_mm, direct_ratio, placed_ratio), bins
                 (distance_mm, points, placed_rms_mm); oracle: bins

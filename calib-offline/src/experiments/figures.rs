@@ -6,6 +6,7 @@ use super::methods::Method;
 use super::spread::{PUBLISHED_CHOICE_PX, SpreadExperiment, SpreadPoint};
 use super::stage::StageExperiment;
 use super::target::{CloudPoint, TargetExperiment, TargetMethod, TargetPose};
+use crate::report::plot::axes::round_up;
 use crate::report::plot::chart::{Axis, Mark, PLOT, Panel, Series, draw};
 
 /// Name and content of every figure that there is.
@@ -179,7 +180,7 @@ fn cloud_figure(target: &TargetExperiment) -> String {
             [0, 2],
         ),
     ];
-    let panels: Vec<Panel> = views
+    let mut panels: Vec<Panel> = views
         .iter()
         .map(|(title, [x_label, y_label], [i, j])| {
             let project = |of: fn(&CloudPoint) -> nalgebra::Vector3<f64>| -> Vec<[f64; 2]> {
@@ -211,7 +212,44 @@ fn cloud_figure(target: &TargetExperiment) -> String {
             }
         })
         .collect();
+    panels.extend(error_panel(target, &panels));
     draw(&panels, "Measured point cloud of the target")
+}
+
+/// The first panel again with the errors as lines, long enough to be seen.
+fn error_panel(target: &TargetExperiment, panels: &[Panel]) -> Option<Panel> {
+    let errors = || target.cloud.iter().map(|p| p.measured_mm - p.nominal_mm);
+    let squares = errors().map(|e| e.norm_squared()).sum::<f64>();
+    let rms_mm = (squares / target.cloud.len().max(1) as f64).sqrt();
+    // A typical line is then 2 to 5 mm long.
+    let times = round_up(2.0 / rms_mm.max(1e-9));
+    let mut lines: Vec<Series> = target
+        .cloud
+        .iter()
+        .zip(errors())
+        .map(|(point, error)| {
+            let (from, to) = (point.nominal_mm, point.nominal_mm + error * times);
+            series("", 1, Mark::Line, vec![[from.x, from.y], [to.x, to.y]])
+        })
+        .collect();
+    if let Some(first) = lines.first_mut() {
+        first.name = format!("measured minus nominal, {times:.0} times as long");
+    }
+    let dots = target
+        .cloud
+        .iter()
+        .map(|p| [p.nominal_mm.x, p.nominal_mm.y]);
+    lines.push(series(
+        "nominal, best placed",
+        4,
+        Mark::Dots,
+        dots.collect(),
+    ));
+    Some(Panel {
+        title: "Errors, seen along z".to_owned(),
+        series: lines,
+        ..panels.first()?.clone()
+    })
 }
 
 /// Ranges around points in which a millimeter is as long across as upwards.
@@ -240,12 +278,11 @@ fn distance_panels(
     let x = || Axis::linear("distance from the middle of the cameras, mm");
     let mut panels = Vec::new();
     if let Some(target) = target {
-        let by_method = |of: fn(&TargetPose) -> f64| -> Vec<Series> {
+        let by_method = |of: fn(&TargetPose) -> Option<f64>| -> Vec<Series> {
             let one = |method: &TargetMethod| {
-                let mut points: Vec<[f64; 2]> = method
-                    .poses
-                    .iter()
-                    .map(|p| [p.distance_mm, of(p)])
+                let poses = method.poses.iter();
+                let mut points: Vec<[f64; 2]> = poses
+                    .filter_map(|p| Some([p.distance_mm, of(p)?]))
                     .collect();
                 points.sort_by(|a, b| a[0].total_cmp(&b[0]));
                 let name = method.method.name();
@@ -257,16 +294,25 @@ fn distance_panels(
             title: "Target: markers from the best-placed nominal one".to_owned(),
             x: x(),
             y: Axis::linear("RMS distance of a pose's markers, mm"),
-            series: by_method(|p| p.errors.rms_mm),
+            series: by_method(|p| Some(p.errors.rms_mm)),
             marks: Vec::new(),
         });
         panels.push(Panel {
             title: "Target: distances of neighboring markers".to_owned(),
             x: x(),
             y: Axis::linear("RMS error of a pose, mm"),
-            series: by_method(|p| p.neighbor_rms_mm),
+            series: by_method(|p| Some(p.neighbor_rms_mm)),
             marks: Vec::new(),
         });
+        if target.methods.iter().any(|m| m.true_rms_mm.is_some()) {
+            panels.push(Panel {
+                title: "Target: markers from their true places".to_owned(),
+                x: x(),
+                y: Axis::linear("RMS error of a pose, frame placed once, mm"),
+                series: by_method(|p| p.true_rms_mm),
+                marks: Vec::new(),
+            });
+        }
     }
     if let Some(known) = known {
         let mut all: Vec<Series> = known

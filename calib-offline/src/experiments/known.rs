@@ -10,6 +10,7 @@ use crate::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
 use crate::geometry::{PixelPoint, best_placement};
 use crate::matches::read_matches;
 use nalgebra::Vector3;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -87,7 +88,7 @@ pub fn run(
             continue;
         }
         let matches = read_matches::<f64>(&file, &names)?;
-        let truth = read_truth(&truth_file)?;
+        let truth: Vec<TrueRow> = read_rows(&truth_file)?;
         if truth.len() != matches.len() {
             return Err(Error::Experiment(ExperimentError::Truth {
                 file: truth_file,
@@ -190,7 +191,8 @@ fn bins(mut pairs: Vec<(f64, f64)>) -> Vec<Bin> {
         .collect()
 }
 
-fn read_truth(file: &Path) -> Result<Vec<TrueRow>, ExperimentError> {
+/// The rows of a table of truth.
+pub(super) fn read_rows<T: DeserializeOwned>(file: &Path) -> Result<Vec<T>, ExperimentError> {
     let wrong = |error: csv::Error| ExperimentError::Truth {
         file: file.to_owned(),
         problem: error.to_string(),

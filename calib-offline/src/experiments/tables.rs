@@ -78,14 +78,15 @@ fn cloud_table(target: &TargetExperiment) -> String {
 
 fn distance_table(target: Option<&TargetExperiment>, known: Option<&KnownExperiment>) -> String {
     let mut text = String::from(
-        "kind,method,pose,distance_mm,points,rms_mm,mean_mm,deviation_mm,neighbor_rms_mm\n",
+        "kind,method,pose,distance_mm,points,rms_mm,mean_mm,deviation_mm,neighbor_rms_mm,true_rms_mm\n",
     );
     for method in target.iter().flat_map(|t| &t.methods) {
         for pose in &method.poses {
             let errors = &pose.errors;
+            let truth = pose.true_rms_mm.map_or_else(String::new, |v| v.to_string());
             let _ = writeln!(
                 text,
-                "target,{},{},{},{},{},{},{},{}",
+                "target,{},{},{},{},{},{},{},{},{truth}",
                 method.method.name(),
                 pose.pose,
                 pose.distance_mm,
@@ -101,7 +102,7 @@ fn distance_table(target: Option<&TargetExperiment>, known: Option<&KnownExperim
         for bin in bins {
             let _ = writeln!(
                 text,
-                "known,{name},,{},{},{},,,",
+                "known,{name},,{},{},,,,{}",
                 bin.distance_mm, bin.points, bin.placed_rms_mm
             );
         }

@@ -1,6 +1,8 @@
 //! The measurement target: its point cloud, and the error against the distance (publication, Fig. 10
 //! and 11). Its markers are known to each other, so no truth of the rig is needed.
 
+use super::ExperimentError;
+use super::known::read_rows;
 use super::methods::{Calibrated, Method, MethodRun, Pixels, calibrated};
 use super::statistics::{ErrorStatistics, rms};
 use crate::board::BoardSpec;
@@ -13,8 +15,9 @@ use crate::evaluate::measured_board::MeasuredBoard;
 use crate::geometry::best_placement;
 use crate::progress::Progress;
 use nalgebra::Vector3;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::path::Path;
 
 /// A pose with fewer markers says little.
 const MIN_MARKERS: usize = 6;
@@ -30,6 +33,9 @@ pub struct TargetPose {
     pub errors: ErrorStatistics,
     /// RMS error of the distances of neighboring markers, mm.
     pub neighbor_rms_mm: f64,
+    /// RMS distance of the markers from their true places, after one rigid placement of all poses
+    /// together; `None` without truth.
+    pub true_rms_mm: Option<f64>,
 }
 
 /// What a method measured.
@@ -43,6 +49,8 @@ pub struct TargetMethod {
     pub errors: Option<ErrorStatistics>,
     /// RMS error of the distances of neighboring markers, all poses together, mm.
     pub neighbor_rms_mm: Option<f64>,
+    /// RMS distance from the true places after one rigid placement, all poses together, mm.
+    pub true_rms_mm: Option<f64>,
     /// The largest standard deviation of a pose, mm.
     pub largest_pose_deviation_mm: Option<f64>,
     /// Per pose, in their order.
@@ -144,12 +152,14 @@ pub fn run(
     if matches.len() < MIN_MARKERS {
         return Ok(Err("no marker was seen by all cameras".to_owned()));
     }
-    Ok(Ok(experiment(target, &matches, runs)))
+    let truth = read_truth(&dataset.folder.join("target/truth.csv"))?;
+    Ok(Ok(experiment(target, &matches, &truth, runs)))
 }
 
 fn experiment(
     target: &TargetSpec,
     matches: &[MarkerMatch],
+    truth: &Truth,
     runs: &[MethodRun],
 ) -> TargetExperiment {
     let items: Vec<Vec<_>> = matches
@@ -178,14 +188,12 @@ fn experiment(
             .iter()
             .flat_map(|(pose, measured)| cloud_of(*pose, measured, &board))
             .collect();
-        methods.push(judge(
-            *method,
-            points.iter().filter(|point| point.is_none()).count(),
-            &by_pose,
-            &placed,
-            calibrated,
-            &board,
-        ));
+        let mut found = judge(*method, &by_pose, &placed, calibrated, &board);
+        found.without_point = points.iter().filter(|point| point.is_none()).count();
+        compare_with_truth(&mut found, &placed, |p| {
+            truth.get(&target.marker_id(p.pose, p.row, p.col)).copied()
+        });
+        methods.push(found);
         // Joint comes last: it is shown if it is there.
         if !placed.is_empty() {
             (cloud_method, cloud) = (Some(*method), placed);
@@ -226,7 +234,6 @@ fn cloud_of(pose: usize, measured: &MeasuredBoard, board: &BoardSpec) -> Vec<Clo
 
 fn judge(
     method: Method,
-    without_point: usize,
     by_pose: &BTreeMap<usize, MeasuredBoard>,
     placed: &[CloudPoint],
     calibrated: &Calibrated,
@@ -252,6 +259,7 @@ fn judge(
                 distance_mm: (middle(&nominal) - middle_of_cameras).norm(),
                 errors: statistics,
                 neighbor_rms_mm: rms(&neighbor),
+                true_rms_mm: None,
             });
         }
         all.extend(errors);
@@ -259,11 +267,65 @@ fn judge(
     }
     TargetMethod {
         method,
-        without_point,
+        without_point: 0,
         errors: ErrorStatistics::of(&all),
         neighbor_rms_mm: (!neighbors.is_empty()).then(|| rms(&neighbors)),
+        true_rms_mm: None,
         largest_pose_deviation_mm: poses.iter().map(|p| p.errors.deviation_mm).reduce(f64::max),
         poses,
+    }
+}
+
+/// True places of markers by their id, mm.
+type Truth = BTreeMap<usize, Vector3<f64>>;
+
+/// A row of `target/truth.csv`; its other columns are for other uses.
+#[derive(Debug, Deserialize)]
+struct TrueMarker {
+    id: usize,
+    x: f64,
+    y: f64,
+    z: f64,
+}
+
+/// Empty if there is no such file.
+fn read_truth(file: &Path) -> Result<Truth, ExperimentError> {
+    if !file.exists() {
+        return Ok(Truth::new());
+    }
+    let rows: Vec<TrueMarker> = read_rows(file)?;
+    let places = rows
+        .iter()
+        .map(|row| (row.id, Vector3::new(row.x, row.y, row.z)));
+    Ok(places.collect())
+}
+
+/// Fills in the errors against the truth, where there is any.
+fn compare_with_truth(
+    found: &mut TargetMethod,
+    placed: &[CloudPoint],
+    truth: impl Fn(&CloudPoint) -> Option<Vector3<f64>>,
+) {
+    let known: Vec<(usize, Vector3<f64>, Vector3<f64>)> = placed
+        .iter()
+        .filter_map(|p| Some((p.pose, p.measured_mm, truth(p)?)))
+        .collect();
+    let (from, to): (Vec<_>, Vec<_>) = known.iter().map(|(_, from, to)| (*from, *to)).unzip();
+    let Some(truth_from_datum) = best_placement(&from, &to) else {
+        return;
+    };
+    let errors: Vec<(usize, f64)> = known
+        .iter()
+        .map(|(pose, from, to)| (*pose, (truth_from_datum.point(from) - to).norm()))
+        .collect();
+    let of = |keep: &dyn Fn(usize) -> bool| {
+        let kept = errors.iter().filter(|(pose, _)| keep(*pose));
+        let kept: Vec<f64> = kept.map(|(_, error)| *error).collect();
+        (!kept.is_empty()).then(|| rms(&kept))
+    };
+    found.true_rms_mm = of(&|_| true);
+    for pose in &mut found.poses {
+        pose.true_rms_mm = of(&|number| number == pose.pose);
     }
 }
 

@@ -144,8 +144,8 @@ fn target_words(target: &TargetExperiment) -> String {
     let mut text = format!(
         "Measurement target (Fig. 10, 11): {} of {} markers were measured by every method. Distances \
          of markers from the best-placed nominal target:\n\n\
-         | method | mean, mm | standard deviation, mm | RMS, mm | worst, mm | neighbors' distance, RMS, mm | no point |\n\
-         | --- | --- | --- | --- | --- | --- | --- |\n",
+         | method | mean, mm | standard deviation, mm | RMS, mm | worst, mm | neighbors' distance, RMS, mm | true places *, RMS, mm | no point |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- |\n",
         target.common, target.markers
     );
     for method in &target.methods {
@@ -157,17 +157,18 @@ fn target_words(target: &TargetExperiment) -> String {
         };
         let _ = writeln!(
             text,
-            "| {} | {} | {} | {} | {} | {} | {} |",
+            "| {} | {} | {} | {} | {} | {} | {} | {} |",
             method.method.name(),
             number(|e| e.mean_mm),
             number(|e| e.deviation_mm),
             number(|e| e.rms_mm),
             number(|e| e.worst_mm),
             method.neighbor_rms_mm.map_or("-".to_owned(), short),
+            method.true_rms_mm.map_or("-".to_owned(), short),
             method.without_point
         );
     }
-    text + "\n"
+    text + "\n\\* where the truth is known, after one rigid placement of all poses together\n\n"
 }
 
 fn known_words(known: &KnownExperiment) -> String {
