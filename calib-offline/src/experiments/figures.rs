@@ -83,13 +83,13 @@ fn spread_figure(spread: &SpreadExperiment) -> String {
         published_mark(),
         (
             spread.best_px,
-            format!("least left-out error: {:.0} px", spread.best_px),
+            format!("least left out: {:.0} px", spread.best_px),
         ),
     ];
     wide_marks.extend(
         spread
             .alternating_px
-            .map(|px| (px, format!("alternating takes {px:.0} px *"))),
+            .map(|px| (px, format!("alternating *: {px:.0} px"))),
     );
     let narrow = |title: &str, label: &str, series| Panel {
         title: title.to_owned(),
@@ -100,7 +100,7 @@ fn spread_figure(spread: &SpreadExperiment) -> String {
     };
     let wide = |title: &str, label: &str, series, marks| Panel {
         title: title.to_owned(),
-        x: Axis::logarithmic("spread, px (logarithmic)  * with a homography before the networks"),
+        x: Axis::logarithmic("spread, px (logarithmic)"),
         y: Axis::logarithmic(label),
         series,
         marks,
@@ -112,7 +112,7 @@ fn spread_figure(spread: &SpreadExperiment) -> String {
             corners(&spread.published),
         ),
         wide(
-            "From 100 px on",
+            "From 100 px on (* with a homography first)",
             "RMS error on the board, mm (logarithmic)",
             corners(&spread.wide),
             wide_marks,
@@ -156,7 +156,7 @@ fn stage_figure(stage: &StageExperiment) -> String {
                     let mut points: Vec<[f64; 2]> =
                         here.map(|a| [a.dial_deg, a.error_deg]).collect();
                     points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-                    let name = format!("{}, RMS {:.5}", method.method.name(), method.rms_deg);
+                    let name = format!("{}, RMS {:.4} deg", method.method.name(), method.rms_deg);
                     series(&name, color(method.method), Mark::LineDots, points)
                 })
                 .collect(),
