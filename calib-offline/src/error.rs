@@ -8,6 +8,7 @@ use crate::detect::DetectError;
 use crate::detect::overlay::OverlayError;
 use crate::detect::ring_target::TargetError;
 use crate::detect::suspicion::LabelSuspicion;
+use crate::experiments::ExperimentError;
 use crate::init::InitError;
 use crate::joint::EstimateError;
 use crate::matches::MatchesError;
@@ -95,6 +96,9 @@ pub enum Error {
     /// A demo that could not measure.
     #[error("the demo cannot measure")]
     Demo(#[from] DemoError),
+    /// Experiments that came to nothing.
+    #[error("the methods cannot be evaluated")]
+    Experiment(#[from] ExperimentError),
     /// A request that cannot be met.
     #[error("the command cannot be run so")]
     Usage(#[from] UsageError),
@@ -235,6 +239,7 @@ impl Error {
             | Self::Estimate(_)
             | Self::Pinhole(_)
             | Self::Alternating(_)
+            | Self::Experiment(ExperimentError::NoMethod { .. })
             | Self::Pack(PackError::NothingCalibrated { .. }) => DATA_UNDETERMINED,
             Self::Manifest(_)
             | Self::Corners(_)
@@ -247,6 +252,7 @@ impl Error {
             | Self::Matches(_)
             | Self::Pack(_)
             | Self::Demo(_)
+            | Self::Experiment(_)
             | Self::Json(_)
             | Self::Write(_)
             | Self::Usage(_) => 2,
@@ -275,6 +281,7 @@ impl Error {
                     .to_owned(),
             ),
             Self::Target(error) => error.remedy(),
+            Self::Experiment(error) => Some(error.remedy()),
             Self::Overlay(_) => Some("choose another folder for --overlay".to_owned()),
             Self::Simulate(_) => Some("see calib-offline simulate --help".to_owned()),
             Self::Init(_) | Self::Estimate(_) => Some(

@@ -11,6 +11,7 @@ pub mod demo;
 pub mod detect;
 pub mod error;
 pub mod evaluate;
+pub mod experiments;
 pub mod field;
 pub mod geometry;
 pub mod init;

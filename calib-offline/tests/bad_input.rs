@@ -661,3 +661,44 @@ mod images {
         refused(path, 2, &["3 images", "4", "image_list"]);
     }
 }
+
+#[test]
+fn evaluations_that_cannot_be() {
+    let home = dataset(MANIFEST, corners_csv(6).as_bytes());
+    let before = contents(home.path());
+    for (arguments, parts) in [
+        (&["evaluate"][..], &["DATASET"][..]),
+        (&["evaluate", "set", "--paper-set-up"], &["--paper-set-up"]),
+        (&["evaluate", "nowhere"], &["nowhere", "try: "]),
+        (
+            &["evaluate", "set", "-o", "set/corners.csv"],
+            &["corners.csv", "try: "],
+        ),
+    ] {
+        run(home.path(), arguments)
+            .assert_code(2)
+            .assert_says(parts);
+        assert_eq!(contents(home.path()), before, "{arguments:?}");
+    }
+    let truth = home.path().join("set/truth.json");
+    for (content, part) in [("{", "EOF"), ("{\"settings\": {}}", "missing field")] {
+        std::fs::write(&truth, content).unwrap();
+        run(home.path(), &["evaluate", "set"])
+            .assert_code(2)
+            .assert_says(&["truth.json: is not the truth", part, "try: "]);
+        assert!(!home.path().join("evaluation").exists());
+    }
+    std::fs::remove_file(&truth).unwrap();
+    let header = "id,u_left,v_left,u_right,v_right\n1,300,200,310,200\n";
+    std::fs::write(home.path().join("set/matches.csv"), header).unwrap();
+    std::fs::write(home.path().join("set/matches_truth.csv"), "id,x\n1,2\n").unwrap();
+    run(home.path(), &["evaluate", "set"])
+        .assert_code(2)
+        .assert_says(&["matches_truth.csv", "missing field"]);
+    let empty = "x,y,z,x_oracle,y_oracle,z_oracle\n";
+    std::fs::write(home.path().join("set/matches_truth.csv"), empty).unwrap();
+    run(home.path(), &["evaluate", "set"])
+        .assert_code(2)
+        .assert_says(&["matches_truth.csv", "0 rows, its matches have 1"]);
+    assert!(!home.path().join("evaluation").exists());
+}

@@ -13,7 +13,7 @@ const LAYERS: [&[&str]; 10] = [
     &["joint", "pinhole", "alternating"],
     &["evaluate", "matches", "pack", "report"],
     &["error"],
-    &["pipeline", "demo", "compare"],
+    &["pipeline", "demo", "compare", "experiments"],
     &["cli"],
 ];
 

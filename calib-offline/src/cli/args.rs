@@ -1,6 +1,6 @@
 //! What can be written on the command line. Each help text starts with an example.
 
-use super::{calibrate, compare, demo, detect, inspect, measure, pack, simulate};
+use super::{calibrate, compare, demo, detect, evaluate, inspect, measure, pack, simulate};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::num::NonZeroUsize;
 
@@ -48,6 +48,8 @@ pub enum Verb {
     Demo(demo::DemoArgs),
     /// Find the board's corners in a dataset's images: corners.csv
     Detect(detect::DetectArgs),
+    /// Run the publication's experiments with three methods: figures, tables, evaluation.json
+    Evaluate(evaluate::EvaluateArgs),
     /// Say what a dataset, a calibration or a blob is
     Inspect(inspect::InspectArgs),
     /// Triangulate matches

@@ -9,6 +9,7 @@ pub mod compare;
 pub mod demo;
 pub mod detect;
 pub mod detect_target;
+pub mod evaluate;
 mod failure;
 pub mod inspect;
 pub mod measure;
@@ -63,6 +64,7 @@ fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
         Verb::Compare(args) => compare::run(args, console),
         Verb::Demo(args) => demo::run(args, console),
         Verb::Detect(args) => recording::detect(args, console),
+        Verb::Evaluate(args) => evaluate::run(args, console),
         Verb::Inspect(args) => inspect::run(args, console),
         Verb::Measure(args) => measure::run(args, console),
         Verb::Pack(args) => pack::run(args, console),

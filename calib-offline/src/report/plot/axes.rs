@@ -29,10 +29,15 @@ impl Axes {
 
     /// Frame, ticks along x and their numbers.
     pub fn draw_x(&self, svg: &mut Svg, label: &str) {
+        self.draw_x_at(svg, label, &ticks(self.x, 6));
+    }
+
+    /// The same with ticks of one's own.
+    pub fn draw_x_at(&self, svg: &mut Svg, label: &str, ticks: &[Tick]) {
         let [left, right] = self.across;
         let [_, bottom] = self.down;
         svg.line("axis", [left, bottom], [right, bottom]);
-        for tick in ticks(self.x, 6) {
+        for tick in ticks {
             let [x, _] = self.at(tick.value, self.y[0]);
             svg.line("axis", [x, bottom], [x, bottom + 4.0]);
             svg.text("tick", [x, bottom + 15.0], Anchor::Middle, &tick.text);

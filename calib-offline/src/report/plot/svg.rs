@@ -2,6 +2,9 @@
 
 use std::fmt::Write as _;
 
+/// Of drawings that stand alone: plain colors, since not every viewer knows variables.
+const STYLE: &str = include_str!("figure.css");
+
 /// Where a text stands relative to its point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
@@ -99,6 +102,17 @@ impl Svg {
             number(self.height),
             escaped(label),
             self.body
+        )
+    }
+
+    /// The drawing as a file of its own, with its style.
+    pub fn finish_alone(self, label: &str) -> String {
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {w} {h}\" role=\"img\" aria-label=\"{}\">\n<style>\n{STYLE}</style>\n{}</svg>\n",
+            escaped(label),
+            self.body,
+            w = number(self.width),
+            h = number(self.height),
         )
     }
 }

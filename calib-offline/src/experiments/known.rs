@@ -1,0 +1,205 @@
+//! Points whose truth is known: absolute error against the distance. Only simulated datasets have them.
+
+use super::ExperimentError;
+use super::methods::{Method, MethodRun};
+use super::statistics::rms;
+use super::target::{measure_all, middle};
+use crate::dataset::Dataset;
+use crate::error::Error;
+use crate::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
+use crate::geometry::{PixelPoint, best_placement};
+use crate::matches::read_matches;
+use nalgebra::Vector3;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Files of matches, each with `NAME_truth.csv` beside it.
+const FILES: [&str; 2] = ["matches", "holdout"];
+/// Bins of the distance, each with as many points as the others.
+const BINS: usize = 12;
+
+/// Points of about one distance.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Bin {
+    /// Mean distance from the middle of the cameras, mm.
+    pub distance_mm: f64,
+    /// Points.
+    pub points: usize,
+    /// RMS distance from the truth after one rigid placement of all points, mm.
+    pub placed_rms_mm: f64,
+}
+
+/// What a method measured.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct KnownMethod {
+    /// Which.
+    pub method: Method,
+    /// Matches that it has no point for.
+    pub without_point: usize,
+    /// All points together.
+    pub errors: Option<TruthErrors>,
+    /// Against the distance.
+    pub bins: Vec<Bin>,
+}
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct KnownExperiment {
+    /// Matches with truth.
+    pub matches: usize,
+    /// Of these, those that every method measured: errors are of those.
+    pub common: usize,
+    /// Whether the frame of the points is that of the truth: else only placed errors mean something.
+    pub frame_is_true: bool,
+    /// Per method.
+    pub methods: Vec<KnownMethod>,
+    /// The true rays of the same noisy pixels, against the distance: the limit that the noise sets.
+    pub oracle: Vec<Bin>,
+}
+
+/// A row of a table of true points; its other columns are for other uses.
+#[derive(Debug, Deserialize)]
+struct TrueRow {
+    x: f64,
+    y: f64,
+    z: f64,
+    x_oracle: f64,
+    y_oracle: f64,
+    z_oracle: f64,
+}
+
+/// Measures the matches of a dataset that have their truth beside them.
+///
+/// The outer error ends the command; the inner one, in words, leaves the experiment out.
+///
+/// # Errors
+/// Unreadable tables.
+pub fn run(
+    dataset: &Dataset,
+    runs: &[MethodRun],
+) -> Result<Result<KnownExperiment, String>, Error> {
+    let names: Vec<String> = dataset.cameras.iter().map(|c| c.name.clone()).collect();
+    let (mut items, mut rows) = (Vec::new(), Vec::new());
+    for name in FILES {
+        let file = dataset.folder.join(format!("{name}.csv"));
+        let truth_file = dataset.folder.join(format!("{name}_truth.csv"));
+        if !(file.exists() && truth_file.exists()) {
+            continue;
+        }
+        let matches = read_matches::<f64>(&file, &names)?;
+        let truth: Vec<TrueRow> = read_rows(&truth_file)?;
+        if truth.len() != matches.len() {
+            return Err(Error::Experiment(ExperimentError::Truth {
+                file: truth_file,
+                problem: format!("{} rows, its matches have {}", truth.len(), matches.len()),
+            }));
+        }
+        for (sightings, row) in matches.iter().zip(truth) {
+            let pixels = sightings
+                .iter()
+                .map(|&(camera_idx, [u, v])| (camera_idx, PixelPoint::new(u, v)));
+            items.push(pixels.collect::<Vec<_>>());
+            rows.push(row);
+        }
+    }
+    if items.is_empty() {
+        return Ok(Err(
+            "the dataset has no matches.csv or holdout.csv with their truth".to_owned(),
+        ));
+    }
+    Ok(Ok(experiment(runs, &items, &rows)))
+}
+
+fn experiment(
+    runs: &[MethodRun],
+    items: &[Vec<(usize, PixelPoint)>],
+    rows: &[TrueRow],
+) -> KnownExperiment {
+    let measured = measure_all(runs, items);
+    let common: Vec<usize> = (0..items.len())
+        .filter(|k| measured.is_common[*k])
+        .collect();
+    let truth = |k: &usize| Vector3::new(rows[*k].x, rows[*k].y, rows[*k].z);
+    let oracle = |k: &usize| Vector3::new(rows[*k].x_oracle, rows[*k].y_oracle, rows[*k].z_oracle);
+    let true_mm: Vec<Vector3<f64>> = common.iter().map(truth).collect();
+    let mut middles = Vec::new();
+    let mut methods = Vec::new();
+    for (method, calibrated, points) in &measured.methods {
+        // A method that does not decide which points are common may lack some of them.
+        let paired: Vec<PointWithTruth> = common
+            .iter()
+            .filter_map(|k| {
+                Some(PointWithTruth {
+                    measured_mm: points[*k]?,
+                    true_mm: truth(k),
+                    oracle_mm: oracle(k),
+                })
+            })
+            .collect();
+        let from: Vec<Vector3<f64>> = paired.iter().map(|p| p.measured_mm).collect();
+        let to: Vec<Vector3<f64>> = paired.iter().map(|p| p.true_mm).collect();
+        let mut bins_of_method = Vec::new();
+        if let Some(placement) = best_placement(&from, &to) {
+            let cameras = placement.point(&middle(&calibrated.cameras_in_datum));
+            middles.push(cameras);
+            let errors: Vec<(f64, f64)> = paired
+                .iter()
+                .map(|p| {
+                    let error = placement.point(&p.measured_mm) - p.true_mm;
+                    ((p.true_mm - cameras).norm(), error.norm())
+                })
+                .collect();
+            bins_of_method = bins(errors);
+        }
+        methods.push(KnownMethod {
+            method: *method,
+            without_point: points.iter().filter(|point| point.is_none()).count(),
+            errors: compare_with_truth(&paired),
+            bins: bins_of_method,
+        });
+    }
+    let cameras = middle(&middles);
+    let limit = common
+        .iter()
+        .zip(&true_mm)
+        .map(|(k, at)| ((at - cameras).norm(), (oracle(k) - at).norm()));
+    KnownExperiment {
+        matches: items.len(),
+        common: common.len(),
+        // The simulation's frame is the board at pose 0.
+        frame_is_true: runs.iter().all(|run| run.datum_pose == 0),
+        methods,
+        oracle: bins(limit.collect()),
+    }
+}
+
+/// RMS of the errors of bins of the distance, from (distance, error).
+fn bins(mut pairs: Vec<(f64, f64)>) -> Vec<Bin> {
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let size = pairs.len().div_ceil(BINS).max(1);
+    pairs
+        .chunks(size)
+        .map(|chunk| {
+            let errors: Vec<f64> = chunk.iter().map(|(_, error)| *error).collect();
+            Bin {
+                distance_mm: chunk.iter().map(|(d, _)| d).sum::<f64>() / chunk.len() as f64,
+                points: chunk.len(),
+                placed_rms_mm: rms(&errors),
+            }
+        })
+        .collect()
+}
+
+/// The rows of a table of truth.
+pub(super) fn read_rows<T: DeserializeOwned>(file: &Path) -> Result<Vec<T>, ExperimentError> {
+    let wrong = |error: csv::Error| ExperimentError::Truth {
+        file: file.to_owned(),
+        problem: error.to_string(),
+    };
+    let mut reader = csv::Reader::from_path(file).map_err(wrong)?;
+    reader
+        .deserialize()
+        .collect::<Result<_, _>>()
+        .map_err(wrong)
+}

@@ -1,0 +1,225 @@
+//! The publication's experiments (its section 3) on any dataset: what each of three methods is worth
+//! on the same screened corners.
+//!
+//! | file | experiment | publication |
+//! | --- | --- | --- |
+//! | [`spread`] | error of the networks against their spread, [`auxiliary`] markers included | Fig. 7 |
+//! | [`stage`] | angles of the poses about the stage's axis against the dial | Fig. 8 |
+//! | [`target`] | the measurement target: point cloud, error against distance | Fig. 10, 11 |
+//! | [`known`] | points with known truth: absolute error against distance | |
+//!
+//! [`methods`] calibrates; [`paper`] simulates a copy of the publication's set-up; [`figures`],
+//! [`tables`] and [`words`] say what was found.
+
+pub mod auxiliary;
+pub mod figures;
+pub mod known;
+pub mod methods;
+pub mod paper;
+pub mod spread;
+pub mod stage;
+pub mod statistics;
+pub mod tables;
+pub mod target;
+pub mod words;
+
+use crate::adjust::Observations;
+use crate::dataset::Dataset;
+use crate::dataset::corners::poses;
+use crate::dataset::split::without_excluded;
+use crate::dataset::sufficiency::check_sufficiency;
+use crate::detect::DetectSettings;
+use crate::error::Error;
+use crate::pipeline;
+use crate::progress::Progress;
+use methods::{Method, MethodRun};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// How much is tried. The default is the publication's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ExperimentSettings {
+    /// Networks from 1000 to 7000 px, spread by spread.
+    pub spreads: usize,
+    /// Spreads from 100 px on.
+    pub wide_spreads: usize,
+    /// Views that the networks' errors are taken over, at most.
+    pub views: usize,
+}
+
+impl Default for ExperimentSettings {
+    fn default() -> Self {
+        Self {
+            spreads: 700,
+            wide_spreads: 60,
+            views: 4,
+        }
+    }
+}
+
+/// What was found on a dataset.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Evaluation {
+    /// Its name in tables.
+    pub name: String,
+    /// Its folder; `None` for a simulated one that is gone.
+    pub dataset: Option<PathBuf>,
+    /// Cameras.
+    pub cameras: Vec<String>,
+    /// Poses that the methods were given.
+    pub poses: usize,
+    /// Corners that the methods were given.
+    pub corners: usize,
+    /// What came of each method.
+    pub methods: Vec<MethodOutcome>,
+    /// Fig. 7.
+    pub spread: Option<spread::SpreadExperiment>,
+    /// Fig. 8.
+    pub stage_angles: Option<stage::StageExperiment>,
+    /// Fig. 10 and 11.
+    pub target: Option<target::TargetExperiment>,
+    /// Points with known truth.
+    pub known_points: Option<known::KnownExperiment>,
+    /// What could not be done.
+    pub left_out: Vec<LeftOut>,
+}
+
+/// What came of a method.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MethodOutcome {
+    /// Which.
+    pub method: Method,
+    /// Poses that it placed.
+    pub placed_poses: usize,
+    /// Why there is nothing of it.
+    pub failed: Option<String>,
+}
+
+/// A part of the experiments that could not be done.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct LeftOut {
+    /// Which.
+    pub part: &'static str,
+    /// Why.
+    pub reason: String,
+}
+
+/// Why experiments came to nothing.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExperimentError {
+    /// No method has a calibration.
+    #[error("none of the methods finds a calibration; the last: {last}")]
+    NoMethod {
+        /// What the last of them said.
+        last: String,
+    },
+    /// A file with the truth of a simulated dataset.
+    #[error("{}: is not the truth of this dataset: {problem}", file.display())]
+    Truth {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+impl ExperimentError {
+    /// What to do about it.
+    pub fn remedy(&self) -> String {
+        match self {
+            Self::NoMethod { .. } => "look at the corners with calib-offline inspect".to_owned(),
+            Self::Truth { .. } => {
+                "simulate the dataset anew, or delete the file: experiments that need it are then left out"
+                    .to_owned()
+            }
+        }
+    }
+}
+
+/// Runs all experiments that a dataset allows.
+///
+/// # Errors
+/// Unusable input; corners that no method can start from; [`ExperimentError`].
+pub fn evaluate(
+    dataset: &Dataset,
+    settings: &ExperimentSettings,
+    progress: &dyn Progress,
+) -> Result<Evaluation, Error> {
+    let views = pipeline::corners(dataset, &DetectSettings::default(), progress)?.views;
+    let all_poses = poses(&views);
+    let used = without_excluded(views, &dataset.excluded_poses).used;
+    check_sufficiency(dataset, &used)?;
+    let sensors = dataset.cameras.iter().map(|camera| camera.sensor).collect();
+    let offered = Observations::new(dataset.board, sensors, &used);
+    let names: Vec<String> = dataset.cameras.iter().map(|c| c.name.clone()).collect();
+    let scene = auxiliary::scene(dataset)?;
+    let mut left_out = Vec::new();
+
+    progress.begin("calibrate with three methods", 0);
+    let stage_entry = |pose| crate::dataset::stage::entry(dataset, &all_poses, pose);
+    let prepared = methods::run_all(&offered, &names, &|pose| stage_entry(pose).placement);
+    progress.end();
+    let (observations, runs) = prepared?;
+    if runs.iter().all(|run| run.outcome.is_err()) {
+        let last = runs.iter().find_map(|run| run.outcome.as_ref().err());
+        let last = last.cloned().unwrap_or_default();
+        return Err(ExperimentError::NoMethod { last }.into());
+    }
+
+    progress.begin("networks of many spreads", 0);
+    let chosen_px = methods::calibrated(&runs).find_map(|(_, calibrated)| calibrated.spread_px);
+    let spread = spread::run(&observations, scene.as_ref(), chosen_px, settings);
+    progress.end();
+    let spread = noted(&mut left_out, "error against spread", spread);
+    if scene.is_none() {
+        left_out.push(LeftOut {
+            part: "auxiliary markers against spread",
+            reason: "the dataset has no truth.json that says where they are".to_owned(),
+        });
+    }
+    let stage = stage::run(&runs, &stage_entry);
+    let stage_angles = noted(&mut left_out, "stage angles", stage);
+    let one_camera = "one camera cannot triangulate".to_owned();
+    let (target, known_points) = if names.len() < 2 {
+        (Err(one_camera.clone()), Err(one_camera))
+    } else {
+        progress.begin("measuring", 0);
+        let target = target::run(dataset, &runs, progress);
+        let known = known::run(dataset, &runs);
+        progress.end();
+        (target?, known?)
+    };
+    Ok(Evaluation {
+        name: dataset_name(dataset),
+        dataset: Some(dataset.folder.clone()),
+        cameras: names,
+        poses: observations.poses.len(),
+        corners: observations.corner_count(),
+        methods: runs.iter().map(MethodRun::outcome).collect(),
+        spread,
+        stage_angles,
+        target: noted(&mut left_out, "measurement target", target),
+        known_points: noted(&mut left_out, "points with known truth", known_points),
+        left_out,
+    })
+}
+
+fn noted<T>(
+    left_out: &mut Vec<LeftOut>,
+    part: &'static str,
+    result: Result<T, String>,
+) -> Option<T> {
+    result
+        .map_err(|reason| left_out.push(LeftOut { part, reason }))
+        .ok()
+}
+
+fn dataset_name(dataset: &Dataset) -> String {
+    let folder = dataset.folder.canonicalize();
+    let folder = folder.as_deref().unwrap_or(&dataset.folder);
+    folder.file_name().map_or_else(
+        || dataset.folder.display().to_string(),
+        |name| name.to_string_lossy().into_owned(),
+    )
+}
