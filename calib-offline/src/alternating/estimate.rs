@@ -167,15 +167,14 @@ pub fn estimate(
         seed: settings.seed,
         warp: settings.warp,
     };
-    let spread = match settings.spread_px {
-        Some(spread_px) => SpreadChoice {
+    let spread = if let Some(spread_px) = settings.spread_px {
+        SpreadChoice {
             spread_px,
             tried: Vec::new(),
-        },
-        None => {
-            let views: Vec<&ViewBlock> = observations.views.iter().collect();
-            choose(&views, &network).ok_or(AlternatingError::FewCorners)?
         }
+    } else {
+        let views: Vec<&ViewBlock> = observations.views.iter().collect();
+        choose(&views, &network).ok_or(AlternatingError::FewCorners)?
     };
     network.spread_px = spread.spread_px;
     let maps = train(observations, &network);

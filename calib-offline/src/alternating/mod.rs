@@ -20,7 +20,7 @@
 //! | (31), (32) | rotation and translation averaging | [`stereo`], [`crate::geometry::so3::karcher_mean`] | cameras brought into one frame first; L1 is no choice with two cameras |
 //! | (33)-(35) | midpoint of two rays | [`crate::geometry::triangulate_pair`] | derivative equal to zero, not "at its maximum" |
 //!
-//! The result is one ray per pixel ([`rays::RayTable`]), and through [`crate::field`] the compressed
+//! The result is one ray per pixel ([`crate::field::RayTable`]), and through [`crate::field`] the compressed
 //! field that everything else works with.
 
 pub mod alternation;

@@ -58,8 +58,8 @@ pub fn solve_truncated(mut a: DMatrix<f64>, mut b: DMatrix<f64>, cut: f64) -> Op
             }
         }
         // Norms are taken anew: updated ones lose their digits where ranks end.
-        for c in steps + 1..cols {
-            norms[c] = a.view((steps + 1, c), (rows - steps - 1, 1)).norm_squared();
+        for (c, norm) in norms.iter_mut().enumerate().skip(steps + 1) {
+            *norm = a.column(c).rows(steps + 1, rows - steps - 1).norm_squared();
         }
         steps += 1;
     }

@@ -63,7 +63,7 @@ pub struct CalibrateArgs {
     /// Seed of everything drawn at random
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Write one ray per pixel of each camera too: rays_NAME.npy
+    /// Write one ray per pixel of each camera too: `rays_NAME.npy`
     #[arg(long)]
     pub ray_tables: bool,
     /// Replace results that stand in the output folder

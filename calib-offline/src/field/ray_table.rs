@@ -40,7 +40,7 @@ impl RayTable {
         })
     }
 
-    /// The table as a NumPy file: an array of shape (height, width, 6) of little-endian f64, for each
+    /// The table as a file of `NumPy`: an array of shape (height, width, 6) of little-endian f64, for each
     /// pixel the origin (mm) and the unit direction of its ray in the rig frame; NaN where it has
     /// none.
     pub fn to_npy(&self) -> Vec<u8> {
@@ -56,7 +56,7 @@ impl RayTable {
     }
 }
 
-/// A NumPy file, format version 1.0, C order.
+/// A file of `NumPy`, format version 1.0, C order.
 fn npy(shape: &[usize], numbers: impl Iterator<Item = f64>) -> Vec<u8> {
     let sizes: Vec<String> = shape.iter().map(usize::to_string).collect();
     let mut header = format!(

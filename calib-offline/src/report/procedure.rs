@@ -153,10 +153,11 @@ mod tests {
             still_falling: None,
             field_rms_error_px: vec![0.01, 0.02],
         });
-        let text: String = facts(&calibration)
+        let lines: Vec<String> = facts(&calibration)
             .into_iter()
-            .map(|(name, fact)| format!("{name}: {fact}\n"))
+            .map(|(name, fact)| format!("{name}: {fact}"))
             .collect();
+        let text = lines.join("\n");
         for part in [
             "spread 438 px, the best of 1 at corners left out: 0.00610 mm",
             "start: pinholes with distortion, all cameras together (0.0300 mm); dearer: the program's own",

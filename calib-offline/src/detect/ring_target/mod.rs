@@ -3,7 +3,7 @@
 //! Per image: areas with a hole ([`components`], [`candidates`]), both edges of each ring fitted
 //! ([`ring_fit`]), rows and columns from neighbor to neighbor ([`grid`]), the target's direction
 //! from its larger markers ([`placement`]), and at last the fit anew with what the perspective does
-//! to the middle of a circle ([`local_map`], [`perspective`]). [`locate`] has the order. Every image
+//! to the middle of a circle ([`local_map`], [`perspective`]). [`locate()`] has the order. Every image
 //! gets a verdict ([`verdict`]); what cannot be numbered without doubt is refused.
 //!
 //! Labels are right-handed in the image, as those of the board: a target in a mirror is refused.

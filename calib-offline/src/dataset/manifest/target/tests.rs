@@ -119,12 +119,11 @@ fn images_of_no_target_and_a_target_without_images_are_refused() {
         without_target.contains("there is no [target]"),
         "{without_target}"
     );
-    let plain: String = cameras
+    let plain: Vec<&str> = cameras
         .lines()
         .filter(|line| !line.starts_with("target_images"))
-        .map(|line| format!("{line}\n"))
         .collect();
-    let manifest = plain + target;
+    let manifest = plain.join("\n") + "\n" + target;
     let without_images = folder(&manifest);
     let message = Dataset::load(without_images.path())
         .unwrap_err()
