@@ -98,7 +98,7 @@ fn in_air_a_pinhole_is_enough() {
         found.stdout
     );
     assert!(!found.stdout.contains("s with its folds"));
-    assert!(found.stdout.contains("matches mm (oracle)"));
+    assert!(found.stdout.contains("matches mm (x oracle)"));
 }
 
 #[test]
