@@ -44,6 +44,20 @@ pub fn compare(
     folds: usize,
     progress: &dyn Progress,
 ) -> Result<Comparison, Error> {
+    compare_methods(&CONTENDERS, dataset, corners, folds, progress)
+}
+
+/// [`compare`] for other methods; the first is what the others are measured against.
+///
+/// # Errors
+/// As [`compare`].
+pub fn compare_methods(
+    contenders: &[Contender],
+    dataset: &Dataset,
+    corners: &Corners,
+    folds: usize,
+    progress: &dyn Progress,
+) -> Result<Comparison, Error> {
     let offered = offered(dataset, corners)?;
     let names = camera_names(dataset);
     // One camera measures no points.
@@ -59,7 +73,7 @@ pub fn compare(
     progress.end();
     let observations = &shared.observations;
     let folds = folds_wanted(observations, folds).min(observations.poses.len());
-    let runs: Vec<Run> = CONTENDERS
+    let runs: Vec<Run> = contenders
         .iter()
         .map(|contender| {
             progress.begin(contender.title, folds);
