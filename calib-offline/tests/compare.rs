@@ -2,6 +2,12 @@
 
 mod common;
 
+use calib_offline::compare::contender::{CONTENDERS, Contender, Failure};
+use calib_offline::compare::{compare_methods, words};
+use calib_offline::dataset::Dataset;
+use calib_offline::detect::DetectSettings;
+use calib_offline::pipeline;
+use calib_offline::progress::Silent;
 use common::{MANIFEST, contents, corners_csv, dataset, run};
 use serde_json::Value;
 use std::fs;
@@ -9,10 +15,14 @@ use std::path::Path;
 
 /// A small recording: 14 poses of 42 corners before two cameras.
 fn simulate(folder: &Path, optics: &str) {
+    simulate_with(folder, optics, &[]);
+}
+
+fn simulate_with(folder: &Path, optics: &str, more: &[&str]) {
     let size = ["--rows", "7", "--cols", "6", "--square-mm", "22"];
     let shots = ["--angles=-39:13:39", "--points", "200", "--holdout", "200"];
     let start = ["simulate", "-o", "set", "--optics", optics, "--seed", "3"];
-    run(folder, &[&start[..], &size, &shots].concat()).assert_code(0);
+    run(folder, &[&start[..], &size, &shots, more].concat()).assert_code(0);
 }
 
 fn method<'a>(object: &'a Value, name: &str) -> &'a Value {
@@ -98,7 +108,7 @@ fn in_air_a_pinhole_is_enough() {
         found.stdout
     );
     assert!(!found.stdout.contains("s with its folds"));
-    assert!(found.stdout.contains("matches mm (oracle)"));
+    assert!(found.stdout.contains("matches mm (x oracle)"));
 }
 
 #[test]
@@ -168,5 +178,61 @@ fn a_damaged_table_of_true_points_is_refused() {
             .assert_code(2)
             .assert_says(&["matches_truth.csv", words, "try: "]);
         assert!(!folder.path().join("out").exists());
+    }
+}
+
+#[test]
+fn outliers_hide_no_difference() {
+    let folder = tempfile::tempdir().unwrap();
+    simulate_with(folder.path(), "port", &["--outliers", "0.05"]);
+    let object = run(folder.path(), &["compare", "set", "--json"])
+        .assert_code(0)
+        .json();
+    let outliers = number(&object["outliers"]) / number(&object["corners"]);
+    // 5 % were displaced by 3 px and more, 40 standard deviations.
+    assert!((0.03..0.06).contains(&outliers), "{outliers}");
+    let rigid = &method(&object, "joint")["against_first"]["rigid"];
+    assert!(number(&rigid["high"]) < 0.95, "{rigid}");
+}
+
+/// A method that never has an answer, and one that has none for any fold.
+#[test]
+fn a_method_that_fails_leaves_the_others_standing() {
+    let folder = tempfile::tempdir().unwrap();
+    simulate(folder.path(), "brown");
+    let dataset = Dataset::load(&folder.path().join("set")).unwrap();
+    let corners = pipeline::corners(&dataset, &DetectSettings::default(), &Silent).unwrap();
+    let [pinhole, _, joint] = &CONTENDERS;
+    let methods = [
+        Contender {
+            name: "never",
+            title: "never",
+            fit: |_, _| Err(Failure("there is none".to_owned())),
+            fold: pinhole.fold,
+        },
+        Contender {
+            name: "no-folds",
+            title: "no folds",
+            fit: pinhole.fit,
+            fold: |_, _| Err(Failure("too few".to_owned())),
+        },
+        *joint,
+    ];
+    let found = compare_methods(&methods, &dataset, &corners, 4, &Silent).unwrap();
+    let [never, no_folds, joint] = &found.methods[..] else {
+        panic!("{}", found.methods.len());
+    };
+    assert_eq!(never.failure.as_deref(), Some("there is none"));
+    assert!(never.training.is_none() && never.held_out.is_none() && never.truth.is_empty());
+    assert_eq!(no_folds.failed_folds.len(), 4);
+    assert!(no_folds.held_out.is_none() && no_folds.training.is_some());
+    assert!(joint.held_out.unwrap().rms_px.unwrap() < 0.1);
+    assert_eq!((found.folds, joint.truth.len()), (4, 2));
+    let text = words::text(&found);
+    for part in [
+        "never: no answer: there is none",
+        "4 fold(s) without an answer; fold 0: too few",
+    ] {
+        assert!(text.contains(part), "{text}");
     }
 }

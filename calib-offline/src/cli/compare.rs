@@ -21,7 +21,8 @@ const FORMATS: &str = "\
 DATASET is a folder with dataset.toml and corners.csv or images, as for calibrate. Every method is
 given the same views (those that the joint estimate finds to agree with each other) and the same
 folds: pinhole (Brown-Conrady distortion, robust, all cameras together) and joint (the ray field of
-calibrate). Held-out figures are from the corners that every method can answer.
+calibrate). Held-out figures are from the corners that every method can answer, without those that
+every method rejects when it sees them.
 
   fitted px    RMS residual of the corners that all methods use, from the calibration of all poses
   held-out px  RMS residual on boards that the method never saw, pose refitted; then the median
@@ -39,7 +40,7 @@ much better. Intervals are 95 %, by drawing boards anew (fixed seed). -v tells t
 Exit code 3: no method has an answer.
 
 With --json: schema calib-offline/compare/1, tool_version, input_sha256, square_mm, working_distance_mm,
-poses, views, corners, folds, boards, held_out_corners, common_corners, conclusion (sentences) and
+poses, views, corners, outliers, folds, boards, held_out_corners, common_corners, conclusion (sentences) and
 methods, each with method, title, failure (null, or why there is no answer), training (rms_px, corners,
 rejected), conversion_error_px (of the method's rays as a ray field), failed_folds (fold, reason),
 held_out (rms_px, median_px, neighbor_rms_percent, neighbor_rms_mm, rigid_rms_mm, points, unanswered),

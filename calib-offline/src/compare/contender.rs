@@ -74,7 +74,7 @@ pub struct Fitted {
 }
 
 /// A method in a comparison.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub struct Contender {
     /// Its name in files.
     pub name: &'static str,

@@ -28,9 +28,11 @@ pub struct Comparison {
     pub views: usize,
     /// Corners.
     pub corners: usize,
+    /// Corners that every method rejects: they are in no held-out figure.
+    pub outliers: usize,
     /// Folds that the held-out figures are from.
     pub folds: usize,
-    /// Held-out corners of those folds.
+    /// Held-out corners of those folds, without the outliers.
     pub held_out_corners: usize,
     /// How many of them every method can answer: the held-out figures are from these.
     pub common_corners: usize,

@@ -161,11 +161,15 @@ fn facts(comparison: &Comparison) -> String {
         "no held-out boards".to_owned()
     } else {
         format!(
-            "held-out: {} boards in {} folds, {} of their {} corners that every method can answer",
+            "held-out: {} boards in {} folds, {} of their {} corners that every method can answer{}",
             comparison.boards,
             comparison.folds,
             comparison.common_corners,
-            comparison.held_out_corners
+            comparison.held_out_corners,
+            match comparison.outliers {
+                0 => String::new(),
+                count => format!(" ({count} wrong ones, which every method rejects, are left out)"),
+            }
         )
     };
     format!(
@@ -192,7 +196,7 @@ fn table(comparison: &Comparison) -> Vec<Vec<String>> {
     header.extend(
         files
             .iter()
-            .map(|file| format!("{} mm (oracle)", file.trim_end_matches(".csv"))),
+            .map(|file| format!("{} mm (x oracle)", file.trim_end_matches(".csv"))),
     );
     let rows = comparison.methods.iter().map(|method| row(method, &files));
     std::iter::once(header).chain(rows).collect()
@@ -314,6 +318,7 @@ pub(super) mod tests {
             poses: 20,
             views: 40,
             corners: 1003,
+            outliers: 0,
             folds: 5,
             held_out_corners: 1003,
             common_corners: 990,

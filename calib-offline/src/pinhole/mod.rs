@@ -5,7 +5,7 @@
 //! [`calibrate_camera()`] takes one camera at a time: homographies ([`homography`]), focal lengths in
 //! closed form ([`zhang()`]), then all numbers and poses together ([`adjustment`]). It starts from the
 //! project's own initialization too and keeps the lower minimum. [`calibrate_rig`] joins the cameras
-//! over their common poses.
+//! over their common poses; [`PinholeRig::rig`] gives them as ray fields, for everything that measures with a rig.
 
 pub mod adjustment;
 mod arrowhead;
