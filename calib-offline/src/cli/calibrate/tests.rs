@@ -134,13 +134,35 @@ fn an_output_that_is_a_file_is_refused_before_any_work() {
 }
 
 #[test]
-fn the_published_procedure_is_not_in_this_version() {
+fn the_method_and_the_ray_tables_asked_for_are_made_and_written() {
+    use crate::field::RayTable;
     let folder = tempfile::tempdir().unwrap();
     dataset(folder.path());
-    let mut args = args(folder.path());
-    args.method = Method::Alternating;
+    let args = CalibrateArgs {
+        method: Method::Alternating,
+        ray_tables: true,
+        ..args(folder.path())
+    };
+    let estimate = |_: &Dataset, settings: &CalibrateSettings, _: &dyn Progress| {
+        assert!(settings.method == Method::Alternating && settings.ray_tables);
+        let calibration = example::calibration();
+        let cameras = calibration.rig.cameras.iter();
+        Ok(Calibrated {
+            ray_tables: cameras.map(RayTable::of_camera).collect(),
+            calibration,
+        })
+    };
+    run(&args, &console(), &estimate).unwrap();
+    let sensor = example::calibration().rig.cameras[0].field.sensor;
+    let bytes = fs::metadata(args.output.join("rays_left.npy"))
+        .unwrap()
+        .len();
+    let numbers = 6 * 8 * u64::from(sensor.width) * u64::from(sensor.height);
+    assert!((numbers + 64..numbers + 256).contains(&bytes), "{bytes}");
+    assert!(args.output.join("rays_right.npy").exists());
+    // They are not replaced unasked either.
     let error = run(&args, &console(), &estimate_never).unwrap_err();
-    assert_eq!(error.exit_code(), 2);
+    assert!(matches!(error, Error::Usage(UsageError::Exists { .. })));
 }
 
 #[test]
