@@ -14,6 +14,7 @@ pub mod evaluate;
 pub mod experiments;
 pub mod field;
 pub mod geometry;
+pub mod in_order;
 pub mod init;
 pub mod joint;
 pub mod matches;

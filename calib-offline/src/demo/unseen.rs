@@ -5,10 +5,10 @@ use crate::adjust::Observations;
 use crate::error::Error;
 use crate::evaluate::held_out::{BoardErrors, Fold, measure_boards};
 use crate::evaluate::{Folds, rms};
+use crate::in_order;
 use crate::matches::source::BlobSource;
 use crate::pack::{AlignedBytes, PackSettings, pack_nearest};
 use ray_runtime::RayBlob;
-use rayon::prelude::*;
 use serde::Serialize;
 
 /// Boards measured by the runtime, single precision, each with the blob of a rig that was
@@ -67,11 +67,9 @@ pub fn measure_unseen(
     offered: &Observations,
     settings: &PackSettings,
 ) -> Result<Option<UnseenBoards>, Error> {
-    let measured: Vec<FoldErrors> = folds
-        .estimated
-        .par_iter()
-        .map(|fold| measure_fold(fold, offered, settings))
-        .collect::<Result<_, _>>()?;
+    let measured = in_order::try_map(&folds.estimated, |fold| {
+        measure_fold(fold, offered, settings)
+    })?;
     let (mut as_recorded, mut as_used) = (BoardErrors::default(), BoardErrors::default());
     let mut blob_error_px = 0.0_f64;
     for fold in measured {

@@ -4,10 +4,10 @@ use super::Detection;
 use super::verdict::{ImageVerdict, Outcome};
 use crate::dataset::image::GrayImage;
 use crate::dataset::{Corner, Dataset, View};
+use crate::in_order;
 use crate::progress::Progress;
 use image::{Rgb, RgbImage};
 use nalgebra::{Matrix2, Vector2};
-use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 const FIRST: Rgb<u8> = Rgb([255, 60, 60]);
@@ -169,7 +169,7 @@ pub(super) fn save_all<T: Sync, I: Into<RgbImage>>(
         source,
     })?;
     progress.begin("drawing overlays", items.len());
-    let written = items.par_iter().try_for_each(|item| {
+    let written = in_order::try_map(items, |item| {
         if let Some((name, image)) = drawn(item) {
             let path = folder.join(name);
             let image: RgbImage = image.into();
@@ -181,7 +181,7 @@ pub(super) fn save_all<T: Sync, I: Into<RgbImage>>(
         Ok(())
     });
     progress.end();
-    written
+    written.map(drop)
 }
 
 impl From<Canvas> for RgbImage {

@@ -1,14 +1,14 @@
 //! All cameras in the frame of the first, all poses in it.
 
 use super::InitError;
-use super::focal_scan::{CameraStart, start_camera};
+use super::focal_scan::start_camera;
 use super::pair_consensus::COARSE_LIMIT_SIGMA;
 use super::screening::{Finding, screen};
 use crate::adjust::Observations;
 use crate::board::BoardShape;
 use crate::field::RayField;
 use crate::geometry::RigidTransform;
-use rayon::prelude::*;
+use crate::in_order;
 
 /// A starting point for the estimate of everything. The rig frame is that of camera 0.
 #[derive(Debug, Clone)]
@@ -33,10 +33,9 @@ pub struct RigStart {
 /// # Errors
 /// What [`start_camera`] says of any camera; what [`screen`] says of their common poses.
 pub fn start_rig(observations: &Observations) -> Result<RigStart, InitError> {
-    let cameras: Vec<CameraStart> = (0..observations.sensors.len())
-        .into_par_iter()
-        .map(|idx| start_camera(&observations.of_camera(idx), idx))
-        .collect::<Result<_, _>>()?;
+    let cameras = in_order::try_map(0..observations.sensors.len(), |idx| {
+        start_camera(&observations.of_camera(idx), idx)
+    })?;
     let median_px = cameras.iter().map(|camera| camera.median_px).collect();
     let fields: Vec<RayField> = cameras.into_iter().map(|camera| camera.field).collect();
     let seen_through: Vec<&RayField> = fields.iter().collect();

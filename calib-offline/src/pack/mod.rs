@@ -26,9 +26,9 @@ pub use sigma_error::{Deviation, PackedPair};
 
 use crate::field::Rig;
 use crate::geometry::{PixelPoint, SensorSize};
+use crate::in_order;
 use ray_runtime::format::{IDENTITY_LEN, MAX_CELLS, MAX_EXTENT_PX};
 use ray_runtime::{OpenError, RayBlob, SelfTestFailure};
-use rayon::prelude::*;
 
 /// What to pack for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -198,11 +198,9 @@ pub enum PackError {
 /// Any [`PackError`]; [`PackError::BoundNotReached`] says what would have been possible.
 pub fn pack(rig: &Rig, settings: &PackSettings) -> Result<Packed, PackError> {
     check(rig, settings)?;
-    let mut chosen = rig
-        .cameras
-        .par_iter()
-        .map(|camera| budget::coarsest_grid(camera, settings))
-        .collect::<Result<Vec<_>, _>>()?;
+    let mut chosen = in_order::try_map(&rig.cameras, |camera| {
+        budget::coarsest_grid(camera, settings)
+    })?;
 
     let frame = format!("board at pose {}", rig.datum_pose);
     let mut parts = encode::BlobParts {

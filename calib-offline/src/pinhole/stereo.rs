@@ -8,9 +8,9 @@ use super::rig::PinholeRig;
 use crate::adjust::Observations;
 use crate::adjust::observations::ViewBlock;
 use crate::geometry::{RigidTransform, so3};
+use crate::in_order;
 use crate::init::InitError;
 use nalgebra::Vector3;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// What the adjustment of all cameras together may move besides the poses.
@@ -51,10 +51,9 @@ pub fn calibrate_rig(
     observations: &Observations,
     settings: &RigSettings,
 ) -> Result<PinholeRig, PinholeError> {
-    let fits: Vec<CameraFit> = (0..observations.sensors.len())
-        .into_par_iter()
-        .map(|camera_idx| calibrate_camera(observations, camera_idx, &settings.adjustment))
-        .collect::<Result<_, _>>()?;
+    let fits = in_order::try_map(0..observations.sensors.len(), |camera_idx| {
+        calibrate_camera(observations, camera_idx, &settings.adjustment)
+    })?;
     join(observations, fits, settings)
 }
 

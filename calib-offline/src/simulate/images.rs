@@ -5,7 +5,7 @@ use super::render::{RenderSettings, Rendered};
 use super::scene::Scene;
 use super::tables::{marker_table, match_table};
 use super::target;
-use rayon::prelude::*;
+use crate::in_order;
 use std::path::Path;
 
 /// The board at every pose in every camera; returns how many images.
@@ -22,14 +22,11 @@ pub(super) fn write_board_images(
         .flat_map(|camera_idx| (0..scene.true_poses.len()).map(move |pose| (camera_idx, pose)))
         .collect();
     let folder = &writer.folder;
-    let sizes = views
-        .par_iter()
-        .map(|&(camera_idx, pose)| {
-            let image = scene.render_board(camera_idx, pose, render);
-            let name = format!("{}/{pose:04}.png", scene.names[camera_idx]);
-            write_png(&image, depth, &folder.join(name))
-        })
-        .collect::<Result<Vec<u64>, _>>()?;
+    let sizes = in_order::try_map(&views, |&(camera_idx, pose)| {
+        let image = scene.render_board(camera_idx, pose, render);
+        let name = format!("{}/{pose:04}.png", scene.names[camera_idx]);
+        write_png(&image, depth, &folder.join(name))
+    })?;
     writer.byte_count += sizes.iter().sum::<u64>();
     Ok(views.len())
 }
@@ -50,16 +47,13 @@ pub(super) fn write_target(
         .flat_map(|camera_idx| (0..poses.len()).map(move |pose| (camera_idx, pose)))
         .collect();
     let folder = &writer.folder;
-    let sizes = views
-        .par_iter()
-        .map(|&(camera_idx, pose)| {
-            // Streams beyond those of the board's poses.
-            let stream = scene.true_poses.len() + pose;
-            let image = scene.render_target(camera_idx, &poses[pose], render, stream);
-            let name = format!("target/{}/{pose:04}.png", scene.names[camera_idx]);
-            write_png(&image, depth, &folder.join(name))
-        })
-        .collect::<Result<Vec<u64>, _>>()?;
+    let sizes = in_order::try_map(&views, |&(camera_idx, pose)| {
+        // Streams beyond those of the board's poses.
+        let stream = scene.true_poses.len() + pose;
+        let image = scene.render_target(camera_idx, &poses[pose], render, stream);
+        let name = format!("target/{}/{pose:04}.png", scene.names[camera_idx]);
+        write_png(&image, depth, &folder.join(name))
+    })?;
     writer.byte_count += sizes.iter().sum::<u64>();
     let markers = target::seen_markers(scene, &poses);
     writer.text(
