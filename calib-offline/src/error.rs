@@ -318,6 +318,9 @@ fn pack_remedy(error: &PackError) -> String {
                 1.1 * best_px
             )
         }
+        PackError::TooFewBytes { need, .. } => format!(
+            "allow {need} bytes, a larger --max-error-px, or leave the uncertainty out with --no-uncertainty"
+        ),
         PackError::NothingCalibrated { .. } => {
             "calibrate with corners over more of the sensor".to_owned()
         }

@@ -1,6 +1,6 @@
-//! The golden blob of format version 2: the packer writes today what it wrote then.
+//! The golden blobs of format version 3: the packer writes today what it wrote then.
 //!
-//! `UPDATE_GOLDEN=1 cargo test --release -p calib-offline --test golden_blob` writes the file
+//! `UPDATE_GOLDEN=1 cargo test --release -p calib-offline --test golden_blob` writes the files
 //! anew. That is right only if the packer was meant to change; a new format version gets a file
 //! of its own, and the old one stays.
 
@@ -10,12 +10,12 @@ use calib_offline::field::{
     BaseLens, CalibratedCamera, CoverageMask, PairUncertainty, Projection, RayField, Rig, SmoothMap,
 };
 use calib_offline::geometry::{PixelPoint, RigidTransform, SensorSize};
-use calib_offline::pack::{AlignedBytes, PackSettings, pack, read_aligned};
+use calib_offline::pack::{AlignedBytes, PackSettings, Prefer, pack, read_aligned};
 use nalgebra::{Matrix3, Matrix4, Vector2, Vector3};
 use ray_runtime::RayBlob;
 use std::path::Path;
 
-const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../data/golden/stereo-v2.rays");
+const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../data/golden");
 
 /// A rotation about y by an angle with this sine and cosine.
 fn yaw(sin: f64, cos: f64) -> Matrix3<f64> {
@@ -98,18 +98,25 @@ fn golden_uncertainty(sensor: SensorSize) -> PairUncertainty {
 }
 
 #[test]
-fn the_packer_still_writes_the_golden_blob() {
+fn the_packer_still_writes_the_golden_blobs() {
+    still_writes("stereo-v3-small.rays", Prefer::Size);
+    still_writes("stereo-v3-fast.rays", Prefer::Speed);
+}
+
+fn still_writes(name: &str, prefer: Prefer) {
+    let path = Path::new(FOLDER).join(name);
     let settings = PackSettings {
         max_error_px: 0.002,
         working_distance_mm: 500.0,
-        identity: *b"golden stereo v2",
+        identity: *b"golden stereo v3",
+        prefer,
         ..PackSettings::default()
     };
     let packed = pack(&golden_rig(), &settings).unwrap();
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
-        std::fs::write(PATH, &packed.bytes).unwrap();
+        std::fs::write(&path, &packed.bytes).unwrap();
     }
-    let golden = read_aligned(Path::new(PATH)).unwrap();
+    let golden = read_aligned(&path).unwrap();
     let (golden, now) = (
         RayBlob::open(&golden).unwrap(),
         AlignedBytes::from(packed.bytes.as_slice()),
@@ -129,6 +136,6 @@ fn the_packer_still_writes_the_golden_blob() {
     assert!(golden.uncertain_pairs().eq(fresh.uncertain_pairs()));
     assert_eq!(golden.max_error_px(), fresh.max_error_px());
     if golden.written_by() == fresh.written_by() {
-        assert_eq!(std::fs::read(PATH).unwrap(), packed.bytes);
+        assert_eq!(std::fs::read(path).unwrap(), packed.bytes);
     }
 }

@@ -1,15 +1,16 @@
 //! A blob opened in place: everything is checked once, nothing is copied.
 
 use crate::camera::Camera;
+use crate::camera_check::CameraCheck;
 use crate::check::{
-    check_padding, check_pairs, check_self_tests, checked_header, is_moderate, is_region_on_sensor,
-    is_rotation, recognized_header, same_bits,
+    check_padding, check_pairs, check_self_tests, checked_header, is_region_on_sensor,
+    recognized_header,
 };
-use crate::error::Table;
 use crate::format::{
-    self, ALIGNMENT, Axis, CameraMeta, Encoding, HEADER_LEN, IDENTITY_LEN, MAX_CELLS, Meta,
-    PairHeader, RECORD_LEN, RECORD_WORDS, Record,
+    self, ALIGNMENT, CameraMeta, HEADER_LEN, IDENTITY_LEN, Meta, PairHeader, RECORD_LEN,
+    RECORD_WORDS, Record,
 };
+use crate::lookup::Views;
 use crate::self_test::SelfTests;
 use crate::triangulate::{self, Triangulation};
 use crate::uncertainty::{Measurement, Pair};
@@ -22,8 +23,8 @@ use crate::{LookupError, MeasureError, OpenError, PixelPoint, Ray, lookup};
 #[derive(Debug, Clone, Copy)]
 pub struct RayBlob<'a> {
     bytes: &'a [u8],
-    /// The same bytes as words.
-    words: &'a [f32],
+    /// The same bytes as pairs of numbers.
+    pairs: &'a [[f32; 2]],
     records: &'a [[u32; RECORD_WORDS]],
     identity: &'a [u8; IDENTITY_LEN],
     frame: &'a str,
@@ -52,7 +53,7 @@ impl<'a> RayBlob<'a> {
                 offset: misalignment as u8,
             });
         }
-        let words = bytemuck::try_cast_slice(bytes).map_err(|_| OpenError::BadHeader)?;
+        let pairs = bytemuck::try_cast_slice(bytes).map_err(|_| OpenError::BadHeader)?;
         let meta_end = HEADER_LEN.saturating_add(header.meta_len as usize);
         let meta_bytes = bytes
             .get(HEADER_LEN..meta_end)
@@ -70,7 +71,7 @@ impl<'a> RayBlob<'a> {
             postcard::take_from_bytes::<Meta<'a>>(meta_bytes).map_err(|_| OpenError::BadMeta)?;
         let blob = Self {
             bytes,
-            words,
+            pairs,
             records,
             identity: meta.identity.try_into().map_err(|_| OpenError::BadMeta)?,
             frame: meta.frame,
@@ -86,7 +87,7 @@ impl<'a> RayBlob<'a> {
         if !(is_positive(meta.max_error_px) && is_positive(meta.working_distance_mm)) {
             return Err(OpenError::BadMeta);
         }
-        let (self_test_bytes, pairs_start) = blob.check_cameras(tables_start)?;
+        let (self_test_bytes, pairs_start) = blob.check_cameras(tables_start, header.version)?;
         let pair_bytes = bytes.get(pairs_start..).ok_or(OpenError::BadHeader)?;
         check_pairs(bytes, pairs_start, header.pair_count, header.camera_count)?;
         let blob = Self {
@@ -179,7 +180,7 @@ impl<'a> RayBlob<'a> {
     /// # Errors
     /// [`LookupError::Outside`], [`LookupError::NoSuchCamera`].
     pub fn lookup(&self, camera: usize, pixel: PixelPoint) -> Result<Ray, LookupError> {
-        lookup::lookup(self.bytes, self.words, self.record(camera)?, pixel)
+        self.views().lookup(self.record(camera)?, pixel)
     }
 
     /// Whether the pixel of a camera has a ray.
@@ -266,7 +267,13 @@ impl<'a> RayBlob<'a> {
         (camera, pixel): (usize, PixelPoint),
     ) -> Result<lookup::MovingRay, MeasureError> {
         self.record(camera)
-            .and_then(|record| lookup::lookup_moving(self.bytes, self.words, record, pixel))
+            .and_then(|record| {
+                if lookup::is_calibrated(self.bytes, record, pixel) {
+                    self.views().lookup_moving(record, pixel)
+                } else {
+                    Err(LookupError::Outside)
+                }
+            })
             .map_err(|error| MeasureError::of_lookup(error, camera))
     }
 
@@ -286,6 +293,13 @@ impl<'a> RayBlob<'a> {
             rest = after;
             Some(pair)
         })
+    }
+
+    const fn views(&self) -> Views<'a> {
+        Views {
+            bytes: self.bytes,
+            pairs: self.pairs,
+        }
     }
 
     fn record(&self, camera: usize) -> Result<Record<'a>, LookupError> {
@@ -309,7 +323,11 @@ impl<'a> RayBlob<'a> {
 
     /// Checks every camera and its tables; what is left of the metadata behind the cameras, and
     /// where the tables end.
-    fn check_cameras(&self, tables_start: usize) -> Result<(&'a [u8], usize), OpenError> {
+    fn check_cameras(
+        &self,
+        tables_start: usize,
+        version: u16,
+    ) -> Result<(&'a [u8], usize), OpenError> {
         let mut rest = self.camera_meta;
         let mut end = tables_start;
         for (camera, words) in self.records.iter().enumerate() {
@@ -320,73 +338,14 @@ impl<'a> RayBlob<'a> {
             if meta.name.is_empty() || !is_first || !is_region_on_sensor(&meta) {
                 return Err(OpenError::BadMeta);
             }
-            end = self.check_camera(camera as u16, &meta, Record(words), end)?;
+            let check = CameraCheck {
+                views: self.views(),
+                camera: camera as u16,
+                record: Record(words),
+                version,
+            };
+            end = check.run(&meta, end)?;
         }
         Ok((rest, end))
-    }
-
-    /// Checks a camera's record and tables, which must start at `start`; where they end.
-    fn check_camera(
-        &self,
-        camera: u16,
-        meta: &CameraMeta<'_>,
-        record: Record<'_>,
-        start: usize,
-    ) -> Result<usize, OpenError> {
-        let layout = |table| OpenError::BadLayout { camera, table };
-        let number = |table| OpenError::BadNumber { camera, table };
-
-        let encoding =
-            Encoding::from_number(record.encoding()).ok_or(OpenError::UnknownEncoding {
-                camera,
-                found: record.encoding(),
-            })?;
-        let (cells, mask_cells) = (record.cells(), record.mask_cells());
-        let is_count = |count: &u32| (1..=MAX_CELLS).contains(count);
-        if !(cells.iter().chain(&mask_cells).all(is_count) && record.reserved() == 0) {
-            return Err(layout(Table::Record));
-        }
-        let [axis_u, axis_v] = [
-            Axis::new(meta.region_u, meta.region_width, cells[0], mask_cells[0]),
-            Axis::new(meta.region_v, meta.region_height, cells[1], mask_cells[1]),
-        ];
-        if !(same_bits(axis_u, record.axis_u())
-            && same_bits(axis_v, record.axis_v())
-            && is_rotation(record.rotation())
-            && record.translation_mm().into_iter().all(is_moderate))
-        {
-            return Err(number(Table::Record));
-        }
-
-        let grid_end = start.saturating_add(format::grid_len(encoding, cells));
-        let grid = self
-            .words
-            .get(start / 4..grid_end / 4)
-            .filter(|_| record.grid_offset() as usize == start)
-            .ok_or(layout(Table::Grid))?;
-        if !grid.iter().copied().all(is_moderate) {
-            return Err(number(Table::Grid));
-        }
-
-        let mask_start = format::aligned(grid_end);
-        let mask_end = mask_start.saturating_add(format::mask_len(mask_cells));
-        let end = format::aligned(mask_end);
-        check_padding(self.bytes, grid_end, mask_start)?;
-        let mask = self
-            .bytes
-            .get(mask_start..mask_end)
-            .filter(|_| record.mask_offset() as usize == mask_start)
-            .ok_or(layout(Table::Mask))?;
-        // Bits behind the last cell.
-        let used = (mask_cells[0] * mask_cells[1]) & 7;
-        let is_padded = used == 0 || mask.last().is_some_and(|last| last >> used == 0);
-        if !is_padded {
-            return Err(number(Table::Mask));
-        }
-        if self.bytes.len() < end {
-            return Err(layout(Table::Mask));
-        }
-        check_padding(self.bytes, mask_end, end)?;
-        Ok(end)
     }
 }

@@ -1,6 +1,6 @@
 //! What a blob says of one camera.
 
-use crate::format::{CameraMeta, Encoding, Record};
+use crate::format::{CameraMeta, Encoding, Form, Record};
 use nalgebra::{Matrix3, Vector3};
 
 /// A camera of a blob.
@@ -14,8 +14,8 @@ pub struct Camera<'a> {
     pub sensor_height: u32,
     /// The part of the sensor that the control grid covers.
     pub region: Region,
-    /// Whether all rays start in one point.
-    pub is_central: bool,
+    /// How the table is stored, and whether all rays start in one point.
+    pub encoding: Encoding,
     /// Cells of the control grid along u and v.
     pub cells: [u32; 2],
     /// Cells of the mask along u and v.
@@ -59,7 +59,10 @@ impl<'a> Camera<'a> {
                 width: meta.region_width,
                 height: meta.region_height,
             },
-            is_central: Encoding::from_number(record.encoding()) == Some(Encoding::CentralF32),
+            encoding: Encoding::from_number(record.encoding()).unwrap_or(Encoding {
+                form: Form::Spline,
+                is_central: true,
+            }),
             cells: record.cells(),
             mask_cells: record.mask_cells(),
             rig_from_camera: RigFromCamera {

@@ -5,9 +5,17 @@
 //! header | metadata (postcard) | pad to 8 | records | tables | pairs
 //! ```
 
+mod axis;
+mod encoding;
 mod pair;
+mod quantized;
+mod record;
 
+pub use axis::Axis;
+pub use encoding::{Encoding, Form, PATCH_LEN, coefficient_count};
 pub use pair::{MAX_NODES, MAX_STEP_PX, NODE_LEN, PAIR_HEADER_LEN, PairHeader, TRIANGLE};
+pub use quantized::{MAX_DEGREE, QUANTIZED_HEADER_LEN, QuantizedHeader, QuantizedMap};
+pub use record::{RECORD_LEN, RECORD_WORDS, Record, RecordFields};
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use serde::{Deserialize, Serialize};
@@ -15,10 +23,11 @@ use serde::{Deserialize, Serialize};
 /// The first four bytes of a blob.
 pub const MAGIC: [u8; 4] = *b"RAYS";
 /// The format version that the packer writes and the newest that this library reads.
-pub const VERSION: u16 = 2;
-/// The oldest version that this library reads: the same, but without any [`PairHeader`].
+pub const VERSION: u16 = 3;
+/// The oldest version that this library reads. Version 2 has no other [`Form`] than splines, version 1
+/// besides that no [`PairHeader`].
 pub const OLDEST_VERSION: u16 = 1;
-/// Length of the header of both versions.
+/// Length of the header of all versions.
 pub const HEADER_LEN: usize = 24;
 /// Every part after the metadata starts on a multiple of this.
 pub const ALIGNMENT: usize = 8;
@@ -199,241 +208,6 @@ pub enum SelfTest {
     },
 }
 
-/// How a control grid's numbers are stored, and how many numbers a knot has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Encoding {
-    /// Half-angle vector, f32: 2 numbers a knot. All rays start in the camera's reference point.
-    CentralF32,
-    /// Half-angle vector and scaled offset, f32: 4 numbers a knot.
-    NonCentralF32,
-}
-
-impl Encoding {
-    /// The number that stands in the record; `None` if it is not known.
-    pub const fn from_number(number: u32) -> Option<Self> {
-        match number {
-            1 => Some(Self::CentralF32),
-            2 => Some(Self::NonCentralF32),
-            _ => None,
-        }
-    }
-
-    /// The number that stands in the record.
-    pub const fn number(self) -> u32 {
-        match self {
-            Self::CentralF32 => 1,
-            Self::NonCentralF32 => 2,
-        }
-    }
-
-    /// Numbers per knot.
-    pub const fn channels(self) -> usize {
-        match self {
-            Self::CentralF32 => 2,
-            Self::NonCentralF32 => 4,
-        }
-    }
-}
-
-/// Words of 4 bytes in a camera's record.
-pub const RECORD_WORDS: usize = 32;
-/// Bytes of a camera's record.
-pub const RECORD_LEN: usize = 4 * RECORD_WORDS;
-
-/// What a lookup needs of a camera, read in place: 32 words, integers and f32 bits.
-///
-/// (A plain array of words, because that is what can be viewed in a byte slice without copying
-/// and without unsafe code.)
-#[derive(Debug, Clone, Copy)]
-pub struct Record<'a>(pub &'a [u32; RECORD_WORDS]);
-
-/// A camera's record as the packer holds it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RecordFields {
-    /// [`Encoding::number`].
-    pub encoding: u32,
-    /// Cells of the control grid along u and v.
-    pub cells: [u32; 2],
-    /// Cells of the mask along u and v.
-    pub mask_cells: [u32; 2],
-    /// Where the control grid starts in the blob, bytes.
-    pub grid_offset: u32,
-    /// Where the mask starts in the blob, bytes.
-    pub mask_offset: u32,
-    /// Working numbers along u and v.
-    pub axes: [Axis; 2],
-    /// Rotation of `rig_from_camera`, row-major.
-    pub rotation: [f32; 9],
-    /// Translation of `rig_from_camera`, mm.
-    pub translation_mm: [f32; 3],
-}
-
-impl RecordFields {
-    /// The record's words.
-    pub fn to_words(&self) -> [u32; RECORD_WORDS] {
-        let mut words = [0; RECORD_WORDS];
-        let integers = [
-            self.encoding,
-            self.cells[0],
-            self.cells[1],
-            self.mask_cells[0],
-            self.mask_cells[1],
-            self.grid_offset,
-            self.mask_offset,
-            0,
-        ];
-        let numbers = self.axes.iter().flat_map(|axis| axis.to_numbers());
-        let pose = self.rotation.iter().chain(&self.translation_mm).copied();
-        let all = integers
-            .into_iter()
-            .chain(numbers.chain(pose).map(f32::to_bits));
-        for (word, value) in words.iter_mut().zip(all) {
-            *word = value;
-        }
-        words
-    }
-}
-
-impl Record<'_> {
-    /// Number of the encoding.
-    pub const fn encoding(self) -> u32 {
-        self.0[0]
-    }
-
-    /// Cells of the control grid along u and v.
-    pub const fn cells(self) -> [u32; 2] {
-        [self.0[1], self.0[2]]
-    }
-
-    /// Cells of the mask along u and v.
-    pub const fn mask_cells(self) -> [u32; 2] {
-        [self.0[3], self.0[4]]
-    }
-
-    /// Where the control grid starts in the blob, bytes.
-    pub const fn grid_offset(self) -> u32 {
-        self.0[5]
-    }
-
-    /// Where the mask starts in the blob, bytes.
-    pub const fn mask_offset(self) -> u32 {
-        self.0[6]
-    }
-
-    /// The word that must be zero.
-    pub const fn reserved(self) -> u32 {
-        self.0[7]
-    }
-
-    /// Working numbers along u.
-    pub const fn axis_u(self) -> Axis {
-        let w = self.0;
-        Axis::from_bits([w[8], w[9], w[10], w[11], w[12], w[13]])
-    }
-
-    /// Working numbers along v.
-    pub const fn axis_v(self) -> Axis {
-        let w = self.0;
-        Axis::from_bits([w[14], w[15], w[16], w[17], w[18], w[19]])
-    }
-
-    /// Rotation of `rig_from_camera`, row-major.
-    pub const fn rotation(self) -> [f32; 9] {
-        let w = self.0;
-        [
-            f32::from_bits(w[20]),
-            f32::from_bits(w[21]),
-            f32::from_bits(w[22]),
-            f32::from_bits(w[23]),
-            f32::from_bits(w[24]),
-            f32::from_bits(w[25]),
-            f32::from_bits(w[26]),
-            f32::from_bits(w[27]),
-            f32::from_bits(w[28]),
-        ]
-    }
-
-    /// Translation of `rig_from_camera`, mm.
-    pub const fn translation_mm(self) -> [f32; 3] {
-        let w = self.0;
-        [
-            f32::from_bits(w[29]),
-            f32::from_bits(w[30]),
-            f32::from_bits(w[31]),
-        ]
-    }
-}
-
-/// Numbers that turn a pixel coordinate into a cell and a fraction, along one axis.
-///
-/// They follow from the region, the cells and the mask's cells ([`Axis::new`]); they stand in the
-/// blob so that a lookup need not divide, and `open` checks that they are the ones that follow.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Axis {
-    /// Outer edge of the region's first pixel, px.
-    pub min_px: f32,
-    /// Outer edge of the region's last pixel, px.
-    pub max_px: f32,
-    /// Cells per pixel.
-    pub cells_per_px: f32,
-    /// Size of a cell, its first 12 binary digits, px: times a cell number it is exact.
-    pub cell_high_px: f32,
-    /// Size of a cell, what `cell_high_px` leaves, px.
-    pub cell_low_px: f32,
-    /// Mask cells per pixel, rounded up: a pixel on a border belongs to the cell after it.
-    pub mask_cells_per_px: f32,
-}
-
-impl Axis {
-    /// The numbers of an axis with `extent_px` pixels from number `first_px` on.
-    ///
-    /// Extents, first pixels up to [`MAX_EXTENT_PX`] and cells from 1 to [`MAX_CELLS`] give finite
-    /// numbers; anything else gives some numbers.
-    pub fn new(first_px: u32, extent_px: u32, cells: u32, mask_cells: u32) -> Self {
-        let (first, extent, cells) = (first_px as f32, extent_px as f32, cells as f32);
-        // Sign, exponent and 11 stored binary digits.
-        let cell_high_px = f32::from_bits((extent / cells).to_bits() & 0xffff_f000);
-        let mask_cells_per_px = mask_cells as f32 / extent;
-        Self {
-            min_px: first - 0.5,
-            max_px: first + extent - 0.5,
-            cells_per_px: cells / extent,
-            cell_high_px,
-            cell_low_px: (extent - cells * cell_high_px) / cells,
-            mask_cells_per_px: f32::from_bits(mask_cells_per_px.to_bits().wrapping_add(1)),
-        }
-    }
-
-    /// The six numbers in the order of the record.
-    pub const fn to_numbers(self) -> [f32; 6] {
-        [
-            self.min_px,
-            self.max_px,
-            self.cells_per_px,
-            self.cell_high_px,
-            self.cell_low_px,
-            self.mask_cells_per_px,
-        ]
-    }
-
-    /// From the six words of the record.
-    pub const fn from_bits(bits: [u32; 6]) -> Self {
-        Self {
-            min_px: f32::from_bits(bits[0]),
-            max_px: f32::from_bits(bits[1]),
-            cells_per_px: f32::from_bits(bits[2]),
-            cell_high_px: f32::from_bits(bits[3]),
-            cell_low_px: f32::from_bits(bits[4]),
-            mask_cells_per_px: f32::from_bits(bits[5]),
-        }
-    }
-}
-
-/// Bytes of a control grid: `(cells_u + 3) * (cells_v + 3)` knots.
-pub const fn grid_len(encoding: Encoding, cells: [u32; 2]) -> usize {
-    (cells[0] as usize + 3) * (cells[1] as usize + 3) * encoding.channels() * 4
-}
-
 /// Bytes of a mask without its padding.
 pub const fn mask_len(cells: [u32; 2]) -> usize {
     (cells[0] as usize * cells[1] as usize).div_ceil(8)
@@ -455,47 +229,6 @@ mod tests {
     }
 
     #[test]
-    fn cell_size_is_kept_to_beyond_single_precision() {
-        for (extent, cells) in [(6000, 97), (1280, 30), (32768, 1023), (7, 3), (1, 1)] {
-            let axis = Axis::new(0, extent, cells, 48);
-            let size = f64::from(axis.cell_high_px) + f64::from(axis.cell_low_px);
-            let exact = f64::from(extent) / f64::from(cells);
-            // 12 digits in the high part, 24 more in the low part.
-            assert!(
-                (size - exact).abs() <= exact * 2.0f64.powi(-35),
-                "{extent} {cells}"
-            );
-            let product = axis.cell_high_px * cells as f32;
-            assert_eq!(
-                f64::from(product),
-                f64::from(axis.cell_high_px) * f64::from(cells)
-            );
-        }
-    }
-
-    #[test]
-    fn a_pixel_on_a_mask_border_is_in_the_cell_after_it() {
-        for (extent, cells) in [
-            (1224u32, 48u32),
-            (1280, 48),
-            (6000, 48),
-            (4500, 36),
-            (6001, 48),
-        ] {
-            let axis = Axis::new(0, extent, 4, cells);
-            for u in 0..extent {
-                let exact = (2 * u + 1) * cells / (2 * extent);
-                let x = u as f32 + 0.5;
-                assert_eq!(
-                    (x * axis.mask_cells_per_px) as u32,
-                    exact,
-                    "{extent} {cells} {u}"
-                );
-            }
-        }
-    }
-
-    #[test]
     fn header_survives_a_round_trip() {
         let header = Header {
             version: VERSION,
@@ -508,30 +241,5 @@ mod tests {
         };
         assert_eq!(Header::read(&header.to_bytes()), Some((MAGIC, header)));
         assert_eq!(Header::read(&header.to_bytes()[..HEADER_LEN - 1]), None);
-    }
-
-    #[test]
-    fn record_survives_a_round_trip() {
-        let fields = RecordFields {
-            encoding: 2,
-            cells: [7, 5],
-            mask_cells: [48, 38],
-            grid_offset: 1000,
-            mask_offset: 2000,
-            axes: [Axis::new(0, 640, 7, 48), Axis::new(0, 480, 5, 38)],
-            rotation: [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0],
-            translation_mm: [10.0, 11.0, 12.0],
-        };
-        let words = fields.to_words();
-        let record = Record(&words);
-        assert_eq!(record.encoding(), fields.encoding);
-        assert_eq!(record.cells(), fields.cells);
-        assert_eq!(record.mask_cells(), fields.mask_cells);
-        assert_eq!(record.grid_offset(), fields.grid_offset);
-        assert_eq!(record.mask_offset(), fields.mask_offset);
-        assert_eq!(record.reserved(), 0);
-        assert_eq!([record.axis_u(), record.axis_v()], fields.axes);
-        assert_eq!(record.rotation(), fields.rotation);
-        assert_eq!(record.translation_mm(), fields.translation_mm);
     }
 }

@@ -15,8 +15,11 @@ pub(crate) struct Place {
 
 impl Axis {
     /// Whether the coordinate lies between the region's outer edges; NaN does not.
+    ///
+    /// Numbers from zero on are in the order of their bits, and all others have larger ones: one
+    /// comparison of integers takes the place of two of numbers.
     pub(crate) fn contains(&self, coordinate_px: f32) -> bool {
-        coordinate_px >= self.min_px && coordinate_px <= self.max_px
+        (coordinate_px - self.min_px).to_bits() <= (self.max_px - self.min_px).to_bits()
     }
 
     /// The mask's cell at a coordinate that the axis contains.
@@ -37,6 +40,15 @@ impl Axis {
                 t * t * t * SIXTH,
             ],
         }
+    }
+
+    /// The grid's cell and the share of it that lies before a coordinate that the axis contains: 0 to
+    /// 1, but for what `cell_high_px` leaves out of a cell's size.
+    pub(crate) fn cell_and_share(&self, coordinate_px: f32, cells: u32) -> (usize, f32) {
+        let x = coordinate_px - self.min_px;
+        let cell = ((x * self.cells_per_px) as u32).min(cells.saturating_sub(1));
+        let share = (x - cell as f32 * self.cell_high_px) * self.cells_per_px;
+        (cell as usize, share)
     }
 
     /// Derivatives of a place's weights by the coordinate, 1/px.

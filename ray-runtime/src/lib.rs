@@ -8,13 +8,17 @@ compile_error!("a blob is read in place and holds little-endian numbers");
 mod aligned;
 mod blob;
 mod camera;
+mod camera_check;
 mod check;
 mod error;
 pub mod format;
 mod grid;
 mod lookup;
+mod polynomial;
+mod quantized;
 mod ray;
 mod self_test;
+mod spline;
 mod triangulate;
 mod uncertainty;
 

@@ -1,63 +1,211 @@
-//! A pixel's ray from the control grid.
+//! A pixel's ray from a camera's table.
 
-use crate::format::{Encoding, Record};
-use crate::grid::{Place, blend, blend_slopes};
+use crate::format::{Encoding, Form, Record};
+use crate::polynomial::{self, Dual, Number};
+use crate::quantized::{QuantizedPart, QuantizedTable};
+use crate::spline::{Knots, Window};
 use crate::{LookupError, PixelPoint, Ray};
 use nalgebra::Vector3;
 
-/// The ray of a pixel, rig frame. `bytes` and `words` are the whole blob, seen two ways.
-pub(crate) fn lookup(
-    bytes: &[u8],
-    words: &[f32],
-    record: Record<'_>,
-    pixel: PixelPoint,
-) -> Result<Ray, LookupError> {
-    if !is_calibrated(bytes, record, pixel) {
-        return Err(LookupError::Outside);
-    }
-    let (window, u, v) = Window::at(record, pixel);
-    let along_u = |knots| blend(u.weights, knots);
-    let along_v = |knots| blend(v.weights, knots);
-    let sample = window
-        .evaluate(words, along_u, along_v)
-        .ok_or(LookupError::Outside)?;
-    Ok(ray(record, sample))
+/// A blob seen two ways: as bytes, and as pairs of numbers.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Views<'a> {
+    pub bytes: &'a [u8],
+    pub pairs: &'a [[f32; 2]],
 }
 
-/// The ray of a pixel, the bits of [`lookup`], and how it moves with u and with v.
-///
-/// Neither this nor what it calls three times is inlined: it is for size, where lookup is for speed.
-#[inline(never)]
-pub(crate) fn lookup_moving(
-    bytes: &[u8],
-    words: &[f32],
-    record: Record<'_>,
-    pixel: PixelPoint,
-) -> Result<MovingRay, LookupError> {
-    if !is_calibrated(bytes, record, pixel) {
-        return Err(LookupError::Outside);
+/// Half-angle vector and scaled offset; the offset of a central camera is zero.
+#[derive(Debug, Clone, Copy)]
+struct Sample<T> {
+    s: [T; 2],
+    n: [T; 2],
+}
+
+/// What a table is evaluated in: numbers, or numbers with their derivatives by the pixel.
+trait Evaluated: Number {
+    /// A coordinate that grows with u at a rate, 1/px.
+    fn along_u(value: f32, per_px: f32) -> Self;
+    /// A coordinate that grows with v at a rate, 1/px.
+    fn along_v(value: f32, per_px: f32) -> Self;
+    /// The spline at the window.
+    fn blend(window: &Window<'_>, knots: Knots<'_>) -> Option<[Self; 2]>;
+}
+
+impl Evaluated for f32 {
+    fn along_u(value: f32, _: f32) -> Self {
+        value
     }
-    let (window, u, v) = Window::at(record, pixel);
-    let [cells_u, cells_v] = record.cells();
-    let [value_u, value_v] = [u, v].map(|place| Weights {
-        of_knot_1: 1.0,
-        of_differences: place.weights,
-    });
-    let slope = |of_differences| Weights {
-        of_knot_1: 0.0,
-        of_differences,
-    };
-    let slope_u = slope(record.axis_u().slopes(pixel.u, cells_u));
-    let slope_v = slope(record.axis_v().slopes(pixel.v, cells_v));
-    let evaluated = [(value_u, value_v), (slope_u, value_v), (value_u, slope_v)]
-        .map(|(along_u, along_v)| window.evaluate_weighted(words, along_u, along_v));
-    let [Some(sample), Some(by_u), Some(by_v)] = evaluated else {
-        return Err(LookupError::Outside);
-    };
-    Ok(MovingRay {
-        ray: ray(record, sample),
-        by_pixel: [by_u, by_v].map(|change| differential(record.rotation(), sample, change)),
-    })
+
+    fn along_v(value: f32, _: f32) -> Self {
+        value
+    }
+
+    fn blend(window: &Window<'_>, knots: Knots<'_>) -> Option<[Self; 2]> {
+        window.blend(knots)
+    }
+}
+
+impl Evaluated for Dual {
+    fn along_u(value: f32, by_u: f32) -> Self {
+        Self {
+            value,
+            by_u,
+            by_v: 0.0,
+        }
+    }
+
+    fn along_v(value: f32, by_v: f32) -> Self {
+        Self {
+            value,
+            by_u: 0.0,
+            by_v,
+        }
+    }
+
+    fn blend(window: &Window<'_>, knots: Knots<'_>) -> Option<[Self; 2]> {
+        window.blend_moving(knots)
+    }
+}
+
+const CENTRAL_PATCHES: u32 = number(Form::Patches, true);
+const NON_CENTRAL_PATCHES: u32 = number(Form::Patches, false);
+
+const fn number(form: Form, is_central: bool) -> u32 {
+    Encoding { form, is_central }.number()
+}
+
+impl Views<'_> {
+    /// The ray of a pixel, rig frame.
+    #[inline(always)]
+    pub fn lookup(self, record: Record<'_>, pixel: PixelPoint) -> Result<Ray, LookupError> {
+        if !is_calibrated(self.bytes, record, pixel) {
+            return Err(LookupError::Outside);
+        }
+        let sample = match record.encoding() {
+            CENTRAL_PATCHES => {
+                let [s] = self.patch::<1, f32>(record, pixel)?;
+                return Ok(central_ray(record, s));
+            }
+            NON_CENTRAL_PATCHES => {
+                let [s, n] = self.patch::<2, f32>(record, pixel)?;
+                Sample { s, n }
+            }
+            _ => self.sample(record, pixel)?,
+        };
+        Ok(ray(record, sample))
+    }
+
+    /// The ray of a pixel of the region, calibrated or not, and how it moves with u and with v: of a
+    /// calibrated pixel the bits of [`lookup`](Self::lookup).
+    ///
+    /// It is for size, where `lookup` is for speed.
+    #[inline(never)]
+    pub fn lookup_moving(
+        self,
+        record: Record<'_>,
+        pixel: PixelPoint,
+    ) -> Result<MovingRay, LookupError> {
+        if !(record.axis_u().contains(pixel.u) && record.axis_v().contains(pixel.v)) {
+            return Err(LookupError::Outside);
+        }
+        let sample: Sample<Dual> = match record.encoding() {
+            CENTRAL_PATCHES => {
+                let [s] = self.patch(record, pixel)?;
+                Sample {
+                    s,
+                    n: [0.0.into(); 2],
+                }
+            }
+            NON_CENTRAL_PATCHES => {
+                let [s, n] = self.patch(record, pixel)?;
+                Sample { s, n }
+            }
+            _ => self.sample(record, pixel)?,
+        };
+        let part = |part: fn(Dual) -> f32| Sample {
+            s: sample.s.map(part),
+            n: sample.n.map(part),
+        };
+        let value = part(|x| x.value);
+        let changes = [part(|x| x.by_u), part(|x| x.by_v)];
+        Ok(MovingRay {
+            ray: ray(record, value),
+            by_pixel: changes.map(|change| differential(record.rotation(), value, change)),
+        })
+    }
+
+    /// The cubics of a pixel's cell: of the half-angle vector, and of the offset if `MAPS` is 2.
+    #[inline(always)]
+    fn patch<const MAPS: usize, T: Evaluated>(
+        self,
+        record: Record<'_>,
+        pixel: PixelPoint,
+    ) -> Result<[[T; 2]; MAPS], LookupError> {
+        let [cells_u, cells_v] = record.cells();
+        let (axis_u, axis_v) = (record.axis_u(), record.axis_v());
+        let (cell_u, x) = axis_u.cell_and_share(pixel.u, cells_u);
+        let (cell_v, y) = axis_v.cell_and_share(pixel.v, cells_v);
+        let x = T::along_u(x, axis_u.cells_per_px);
+        let y = T::along_v(y, axis_v.cells_per_px);
+        let cell = cell_v * cells_u as usize + cell_u;
+        let start = (record.grid_offset() >> 3) as usize + cell * (10 * MAPS);
+        let coefficients = self.pairs.get(start..).ok_or(LookupError::Outside)?;
+        let (maps, _) = coefficients.as_chunks::<10>();
+        let maps = maps.first_chunk::<MAPS>().ok_or(LookupError::Outside)?;
+        Ok(maps.each_ref().map(|map| polynomial::cubic(map, x, y)))
+    }
+
+    /// The sample of a spline or a quantized table. The error cannot happen in a blob that was
+    /// opened: the sizes of its tables were checked.
+    #[inline(never)]
+    fn sample<T: Evaluated>(
+        self,
+        record: Record<'_>,
+        pixel: PixelPoint,
+    ) -> Result<Sample<T>, LookupError> {
+        let window = Window::at(record, pixel);
+        let encoding = Encoding::from_number(record.encoding()).ok_or(LookupError::Outside)?;
+        let blend = |knots: Knots<'_>| T::blend(&window, knots).ok_or(LookupError::Outside);
+        let none = [T::from(0.0); 2];
+        if encoding.form == Form::Spline {
+            let first = (record.grid_offset() >> 3) as usize;
+            let stride = encoding.channels() / 2;
+            let knots = |channels: usize| Knots::F32 {
+                pairs: self.pairs.get(first + channels..).unwrap_or_default(),
+                stride,
+            };
+            return Ok(Sample {
+                s: blend(knots(0))?,
+                n: if encoding.is_central {
+                    none
+                } else {
+                    blend(knots(1))?
+                },
+            });
+        }
+        let table = QuantizedTable::new(self, record)?;
+        let [scale_u, scale_v] = table.header.scale;
+        let x = (pixel.u - record.axis_u().min_px) * scale_u - 1.0;
+        let y = (pixel.v - record.axis_v().min_px) * scale_v - 1.0;
+        let (x, y) = (T::along_u(x, scale_u), T::along_v(y, scale_v));
+        let map = |part: QuantizedPart<'_>| -> Result<[T; 2], LookupError> {
+            let [a, b] = polynomial::evaluate(part.coefficients, x, y);
+            let Some(knots) = part.knots else {
+                return Ok([a, b]);
+            };
+            let [c, d] = blend(knots)?;
+            let step = T::from(part.step);
+            Ok([a + step * c, b + step * d])
+        };
+        Ok(Sample {
+            s: map(table.direction()?)?,
+            n: if encoding.is_central {
+                none
+            } else {
+                map(table.offset()?)?
+            },
+        })
+    }
 }
 
 /// A ray and its derivatives by the pixel.
@@ -75,113 +223,22 @@ impl MovingRay {
     }
 }
 
-/// The ray of a sample of the control grid, rig frame.
-fn ray(record: Record<'_>, [s1, s2, m1, m2]: [f32; 4]) -> Ray {
-    let (rotation, translation) = (record.rotation(), record.translation_mm());
-    let origin_mm = if record.encoding() == Encoding::CentralF32.number() {
-        translation.into()
-    } else {
-        origin(rotation, translation, [s1, s2], [m1, m2])
-    };
+/// The ray of a sample of a camera's table, rig frame.
+fn ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
+    // Odd numbers are central.
+    if record.encoding() & 1 == 1 {
+        return central_ray(record, sample.s);
+    }
     Ray {
-        origin_mm,
-        direction: direction(rotation, [s1, s2]),
+        origin_mm: origin(record.rotation(), record.translation_mm(), sample),
+        direction: direction(record.rotation(), sample.s),
     }
 }
 
-/// Weights along one axis, of a place or of its derivative.
-#[derive(Debug, Clone, Copy)]
-struct Weights {
-    /// 1 for the place, 0 for the derivative: exact either way.
-    of_knot_1: f32,
-    of_differences: [f32; 3],
-}
-
-impl Weights {
-    fn applied_to(self, knots: [f32; 4]) -> f32 {
-        self.of_knot_1 * knots[1] + blend_slopes(self.of_differences, knots)
-    }
-}
-
-/// What of the control grid a pixel needs.
-#[derive(Debug, Clone, Copy)]
-struct Window {
-    /// The first of the 4 x 4 knots, in words.
-    start: usize,
-    knots_u: usize,
-    is_central: bool,
-}
-
-impl Window {
-    /// The window of a pixel in the region, and the pixel's places along u and v.
-    fn at(record: Record<'_>, pixel: PixelPoint) -> (Self, Place, Place) {
-        let [cells_u, cells_v] = record.cells();
-        let u = record.axis_u().place(pixel.u, cells_u);
-        let v = record.axis_v().place(pixel.v, cells_v);
-        let is_central = record.encoding() == Encoding::CentralF32.number();
-        let channels = if is_central { 2 } else { 4 };
-        let knots_u = cells_u as usize + 3;
-        let first = (record.grid_offset() >> 2) as usize;
-        let window = Self {
-            start: first + (v.cell * knots_u + u.cell) * channels,
-            knots_u,
-            is_central,
-        };
-        (window, u, v)
-    }
-
-    /// The bicubic spline: first along u in each of four rows, then along v. Of a central camera
-    /// the offset is zero. `None` cannot happen in a blob that was opened: its size was checked.
-    fn evaluate(
-        self,
-        words: &[f32],
-        along_u: impl Fn([f32; 4]) -> f32,
-        along_v: impl Fn([f32; 4]) -> f32,
-    ) -> Option<[f32; 4]> {
-        if self.is_central {
-            let [s1, s2] = self.channels::<2, 8>(words, along_u, along_v)?;
-            Some([s1, s2, 0.0, 0.0])
-        } else {
-            self.channels::<4, 16>(words, along_u, along_v)
-        }
-    }
-
-    /// The same with weights that are known only when it is called.
-    #[inline(never)]
-    fn evaluate_weighted(
-        self,
-        words: &[f32],
-        along_u: Weights,
-        along_v: Weights,
-    ) -> Option<[f32; 4]> {
-        self.evaluate(
-            words,
-            |knots| along_u.applied_to(knots),
-            |knots| along_v.applied_to(knots),
-        )
-    }
-
-    /// `ROW` is `4 * CHANNELS`.
-    fn channels<const CHANNELS: usize, const ROW: usize>(
-        self,
-        words: &[f32],
-        along_u: impl Fn([f32; 4]) -> f32,
-        along_v: impl Fn([f32; 4]) -> f32,
-    ) -> Option<[f32; CHANNELS]> {
-        let stride = self.knots_u * CHANNELS;
-        let row = |j: usize| -> Option<[f32; CHANNELS]> {
-            let knots = words.get(self.start + j * stride..)?.first_chunk::<ROW>()?;
-            Some(core::array::from_fn(|channel| {
-                along_u(core::array::from_fn(|i| {
-                    knots.get(i * CHANNELS + channel).map_or(0.0, |k| *k)
-                }))
-            }))
-        };
-        let (a, b, c, d) = (row(0)?, row(1)?, row(2)?, row(3)?);
-        Some(core::array::from_fn(|channel| {
-            let at = |row: &[f32; CHANNELS]| row.get(channel).map_or(0.0, |value| *value);
-            along_v([at(&a), at(&b), at(&c), at(&d)])
-        }))
+fn central_ray(record: Record<'_>, s: [f32; 2]) -> Ray {
+    Ray {
+        origin_mm: record.translation_mm().into(),
+        direction: direction(record.rotation(), s),
     }
 }
 
@@ -214,7 +271,8 @@ fn direction(r: [f32; 9], [s1, s2]: [f32; 2]) -> Vector3<f32> {
 
 /// Origin of the ray, mm: the two axes across it, of length `1 + s.s/4`, times the scaled offset
 /// `m / (1 + s.s/4)` that the grid holds, so that nothing is divided.
-fn origin(r: [f32; 9], t: [f32; 3], [s1, s2]: [f32; 2], [m1, m2]: [f32; 2]) -> Vector3<f32> {
+fn origin(r: [f32; 9], t: [f32; 3], sample: Sample<f32>) -> Vector3<f32> {
+    let ([s1, s2], [m1, m2]) = (sample.s, sample.n);
     let difference = 0.25 * (s2 * s2 - s1 * s1);
     let product = -0.5 * (s1 * s2);
     let x = m1 + (difference * m1 + product * m2);
@@ -229,7 +287,9 @@ fn origin(r: [f32; 9], t: [f32; 3], [s1, s2]: [f32; 2], [m1, m2]: [f32; 2]) -> V
 
 /// How a ray moves when a sample of the control grid changes, both parts per unit of the change:
 /// the differential of [`direction`] and [`origin`].
-fn differential(r: [f32; 9], [s1, s2, m1, m2]: [f32; 4], [ds1, ds2, dm1, dm2]: [f32; 4]) -> Ray {
+fn differential(r: [f32; 9], sample: Sample<f32>, change: Sample<f32>) -> Ray {
+    let ([s1, s2], [m1, m2]) = (sample.s, sample.n);
+    let ([ds1, ds2], [dm1, dm2]) = (change.s, change.n);
     let difference = 0.25 * (s2 * s2 - s1 * s1);
     let product = -0.5 * (s1 * s2);
     let difference_change = 0.5 * (s2 * ds2 - s1 * ds1);
@@ -257,6 +317,10 @@ fn differential(r: [f32; 9], [s1, s2, m1, m2]: [f32; 4], [ds1, ds2, dm1, dm2]: [
 mod tests {
     use super::*;
 
+    fn sample(s: [f32; 2], n: [f32; 2]) -> Sample<f32> {
+        Sample { s, n }
+    }
+
     const IDENTITY: [f32; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
 
     #[test]
@@ -266,11 +330,11 @@ mod tests {
         // The axes across are -z and y, each of length 2.
         let at = [10.0, 20.0, 30.0];
         assert_eq!(
-            origin(IDENTITY, at, sideways, [1.0, 0.0]),
+            origin(IDENTITY, at, sample(sideways, [1.0, 0.0])),
             Vector3::new(10.0, 20.0, 28.0)
         );
         assert_eq!(
-            origin(IDENTITY, at, sideways, [0.0, 1.0]),
+            origin(IDENTITY, at, sample(sideways, [0.0, 1.0])),
             Vector3::new(10.0, 22.0, 30.0)
         );
     }
@@ -278,23 +342,21 @@ mod tests {
     #[test]
     fn slope_is_the_differential_of_the_ray() {
         let turn = [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
-        let sample = [0.6, -0.9, 3.0, -2.0];
+        let start = [0.6, -0.9, 3.0, -2.0];
+        let sampled = |[s1, s2, m1, m2]: [f32; 4]| sample([s1, s2], [m1, m2]);
         for channel in 0..4 {
             // Powers of two: the differences are exact to round-off of the ray alone.
             let h = 0.0078125;
             let mut change = [0.0; 4];
             change[channel] = 1.0;
             let at = |step: f32| {
-                let mut moved = sample;
+                let mut moved = start;
                 moved[channel] += step;
-                let [s1, s2, m1, m2] = moved;
-                (
-                    origin(turn, [0.0; 3], [s1, s2], [m1, m2]),
-                    direction(turn, [s1, s2]),
-                )
+                let moved = sampled(moved);
+                (origin(turn, [0.0; 3], moved), direction(turn, moved.s))
             };
             let (low, high) = (at(-h), at(h));
-            let found = differential(turn, sample, change);
+            let found = differential(turn, sampled(start), sampled(change));
             // Origin and direction are quadratic in s: central differences are exact.
             let error = (high.0 - low.0) / (2.0 * h) - found.origin_mm;
             assert!(error.norm() < 1e-4, "{channel}: {error}");
@@ -310,7 +372,7 @@ mod tests {
         assert_eq!(direction(turn, [0.0, 0.0]), Vector3::x());
         assert_eq!(direction(turn, [2.0, 0.0]), Vector3::y() * 2.0);
         assert_eq!(
-            origin(turn, [0.0; 3], [0.0, 0.0], [1.0, 2.0]),
+            origin(turn, [0.0; 3], sample([0.0, 0.0], [1.0, 2.0])),
             Vector3::new(0.0, 1.0, 2.0)
         );
     }

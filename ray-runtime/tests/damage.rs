@@ -3,10 +3,10 @@
 mod common;
 
 use common::{
-    AlignedBytes, Random, TestBlob, TestCamera, TestPair, records_start, repair_checksum,
+    AlignedBytes, Random, TestBlob, TestCamera, TestPair, encoding, records_start, repair_checksum,
 };
 use ray_runtime::format::{
-    Encoding, HEADER_LEN, MAGIC, OLDEST_VERSION, PAIR_HEADER_LEN, PairHeader, RECORD_LEN, SelfTest,
+    Form, HEADER_LEN, MAGIC, OLDEST_VERSION, PAIR_HEADER_LEN, PairHeader, RECORD_LEN, SelfTest,
     VERSION,
 };
 use ray_runtime::{OpenError, PixelPoint, RayBlob, Table};
@@ -14,10 +14,16 @@ use ray_runtime::{OpenError, PixelPoint, RayBlob, Table};
 /// One central and one non-central camera, with a mask whose last byte is not full, and their
 /// uncertainty.
 fn sample() -> TestBlob {
+    sample_of(Form::Spline)
+}
+
+fn sample_of(form: Form) -> TestBlob {
+    let mut first = TestCamera::new("first", -80.0);
+    first.encoding = encoding(form, true);
     let mut second = TestCamera::new("second", 80.0);
-    second.encoding = Encoding::NonCentralF32;
+    second.encoding = encoding(form, false);
     second.offset_mm = [0.5, -0.25];
-    let mut blob = TestBlob::new(vec![TestCamera::new("first", -80.0), second]);
+    let mut blob = TestBlob::new(vec![first, second]);
     blob.pairs = vec![TestPair::new([0, 1])];
     blob.self_tests = vec![SelfTest::Ray {
         camera: 1,
@@ -27,6 +33,8 @@ fn sample() -> TestBlob {
     }];
     blob
 }
+
+const FORMS: [Form; 3] = [Form::Spline, Form::Patches, Form::Quantized];
 
 fn refused(bytes: &[u8]) -> OpenError {
     RayBlob::open(bytes).expect_err("should be refused")
@@ -42,7 +50,11 @@ fn refused_with(at: usize, replacement: &[u8]) -> OpenError {
 
 #[test]
 fn truncation_at_every_length_is_refused() {
-    let whole = sample().bytes();
+    FORMS.into_iter().for_each(truncations_are_refused);
+}
+
+fn truncations_are_refused(form: Form) {
+    let whole = sample_of(form).bytes();
     let whole = whole.bytes();
     assert!(RayBlob::open(whole).is_ok());
     for length in 0..whole.len() {
@@ -63,13 +75,21 @@ fn truncation_at_every_length_is_refused() {
 
 #[test]
 fn a_flip_of_every_bit_is_refused() {
-    let mut bytes = sample().bytes();
+    FORMS.into_iter().for_each(flips_are_refused);
+}
+
+fn flips_are_refused(form: Form) {
+    let mut bytes = sample_of(form).bytes();
     for bit in 0..bytes.bytes().len() * 8 {
         bytes.bytes_mut()[bit / 8] ^= 1 << (bit % 8);
         let error = refused(bytes.bytes());
         let fits = match bit / 8 {
             0..4 => matches!(error, OpenError::BadMagic { .. }),
-            4..6 => matches!(error, OpenError::WrongVersion { .. }),
+            // One bit away from version 3 there is version 2.
+            4..6 => matches!(
+                error,
+                OpenError::WrongVersion { .. } | OpenError::BadCrc { .. }
+            ),
             8..12 => matches!(
                 error,
                 OpenError::Truncated { .. } | OpenError::TrailingBytes { .. }
@@ -303,6 +323,67 @@ fn every_number_of_a_grid_must_be_finite() {
 }
 
 #[test]
+fn forms_of_a_later_version_are_refused_in_an_earlier_one() {
+    for form in [Form::Patches, Form::Quantized] {
+        let mut bytes = sample_of(form).bytes();
+        bytes.bytes_mut()[4] = 2;
+        repair_checksum(bytes.bytes_mut());
+        let found = encoding(form, true).number();
+        assert_eq!(
+            refused(bytes.bytes()),
+            OpenError::UnknownEncoding { camera: 0, found }
+        );
+    }
+    let mut bytes = sample().bytes();
+    bytes.bytes_mut()[4] = 2;
+    repair_checksum(bytes.bytes_mut());
+    assert!(RayBlob::open(bytes.bytes()).is_ok());
+}
+
+#[test]
+fn each_part_of_a_quantized_table_is_judged() {
+    let content = sample_of(Form::Quantized);
+    let whole = content.bytes();
+    let start = records_start(whole.bytes()) + 2 * RECORD_LEN;
+    let refused_with = |at: usize, replacement: &[u8]| {
+        let mut bytes = content.bytes();
+        bytes.bytes_mut()[start + at..start + at + replacement.len()].copy_from_slice(replacement);
+        repair_checksum(bytes.bytes_mut());
+        refused(bytes.bytes())
+    };
+    let layout = OpenError::BadLayout {
+        camera: 0,
+        table: Table::Grid,
+    };
+    let number = OpenError::BadNumber {
+        camera: 0,
+        table: Table::Grid,
+    };
+    // Degree, bytes of a number, and any offset of a camera that has none.
+    assert_eq!(refused_with(0, &[10]), layout);
+    assert_eq!(refused_with(0, &[2]), layout);
+    assert_eq!(refused_with(1, &[3]), layout);
+    assert_eq!(refused_with(2, &[1]), layout);
+    assert_eq!(refused_with(3, &[1]), layout);
+    assert_eq!(refused_with(8, &1f32.to_le_bytes()), layout);
+    // The starts of the parts.
+    for word in 5..8 {
+        assert_eq!(refused_with(4 * word, &8u32.to_le_bytes()), layout);
+    }
+    // Step, scales, coefficients.
+    for word in (1..2).chain(3..5).chain(8..14) {
+        for bad in [f32::NAN, f32::INFINITY, -1e30] {
+            assert_eq!(refused_with(4 * word, &bad.to_le_bytes()), number, "{word}");
+        }
+    }
+    // Any knots are knots.
+    let mut bytes = content.bytes();
+    bytes.bytes_mut()[start + 56..start + 60].fill(0xff);
+    repair_checksum(bytes.bytes_mut());
+    assert!(RayBlob::open(bytes.bytes()).is_ok());
+}
+
+#[test]
 fn each_part_of_a_pair_is_judged() {
     let spoiled = |spoil: fn(&mut PairHeader)| {
         let mut content = sample();
@@ -368,10 +449,14 @@ fn pairs_that_stand_there_twice_or_out_of_order_are_refused() {
 /// past it.
 #[test]
 fn random_damage_with_a_right_checksum_never_panics() {
-    let whole = sample().bytes();
+    FORMS.into_iter().for_each(random_damage_never_panics);
+}
+
+fn random_damage_never_panics(form: Form) {
+    let whole = sample_of(form).bytes();
     let mut random = Random(2024);
     let (mut opened, mut refused) = (0, 0);
-    for round in 0..200_000 {
+    for round in 0..100_000 {
         let mut bytes = AlignedBytes::new(whole.bytes());
         let length = bytes.bytes().len();
         // Half of the rounds aim at header and metadata, where structure is.

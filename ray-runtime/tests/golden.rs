@@ -46,7 +46,7 @@ fn header_and_records_are_where_the_format_says() {
     assert_eq!(left[5] as usize, records + 2 * RECORD_LEN);
     assert_eq!(
         left[6] as usize,
-        648 + format::grid_len(Encoding::CentralF32, [8, 6])
+        648 + Encoding::from_number(1).unwrap().table_len([8, 6]).unwrap()
     );
     assert_eq!(right[5] as usize, 1440 + format::mask_len([48, 36]));
     assert_eq!(Record(&right).cells(), [5, 4]);
@@ -62,7 +62,7 @@ fn metadata_says_what_was_packed() {
     assert_eq!(blob.camera_count(), 2);
     let (left, right) = (blob.camera(0).unwrap(), blob.camera(1).unwrap());
     assert_eq!((left.name, right.name), ("left", "right"));
-    assert!(left.is_central && !right.is_central);
+    assert!(left.encoding.is_central && !right.encoding.is_central);
     let whole = Region {
         u: 0,
         v: 0,

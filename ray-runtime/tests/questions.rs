@@ -2,12 +2,14 @@
 
 mod common;
 
-use common::{Random, TestBlob, TestCamera};
+use common::{Random, TestBlob, TestCamera, encoding};
 use nalgebra::Vector3;
-use ray_runtime::format::{Encoding, SelfTest};
+use ray_runtime::format::{Form, SelfTest};
 use ray_runtime::{
     LookupError, MeasureError, PixelPoint, RayBlob, SelfTestFailure, triangulate_pair,
 };
+
+const FORMS: [Form; 3] = [Form::Spline, Form::Patches, Form::Quantized];
 
 /// Looks back at the first camera's side: x and z turned around.
 const TURNED: [f32; 9] = [-1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0];
@@ -23,7 +25,12 @@ fn the_center_of_the_sensor_looks_straight_ahead() {
 
 #[test]
 fn every_pixel_of_a_linear_field_has_its_direction() {
-    let camera = TestCamera::new("a", 0.0);
+    FORMS.into_iter().for_each(every_pixel_has_its_direction);
+}
+
+fn every_pixel_has_its_direction(form: Form) {
+    let mut camera = TestCamera::new("a", 0.0);
+    camera.encoding = encoding(form, true);
     let bytes = TestBlob::new(vec![camera.clone()]).bytes();
     let blob = RayBlob::open(bytes.bytes()).unwrap();
     for v in 0..=96 {
@@ -41,13 +48,17 @@ fn every_pixel_of_a_linear_field_has_its_direction() {
 
 #[test]
 fn an_offset_moves_the_ray_across_itself_and_turns_with_the_camera() {
+    FORMS.into_iter().for_each(an_offset_moves_the_ray);
+}
+
+fn an_offset_moves_the_ray(form: Form) {
     let mut camera = TestCamera::new("a", 100.0);
-    camera.encoding = Encoding::NonCentralF32;
+    camera.encoding = encoding(form, false);
     camera.offset_mm = [3.0, 4.0];
     camera.rotation = TURNED;
     let bytes = TestBlob::new(vec![camera.clone()]).bytes();
     let blob = RayBlob::open(bytes.bytes()).unwrap();
-    assert!(!blob.camera(0).unwrap().is_central);
+    assert!(!blob.camera(0).unwrap().encoding.is_central);
 
     let center = blob.lookup(0, PixelPoint::new(31.5, 23.5)).unwrap();
     assert!((center.origin_mm - Vector3::new(97.0, 4.0, 0.0)).norm() < 1e-5);

@@ -2,9 +2,9 @@
 
 mod common;
 
-use common::{TestBlob, TestCamera, TestPair};
+use common::{TestBlob, TestCamera, TestPair, encoding};
 use nalgebra::{Matrix3, Matrix3x4, Matrix4, Vector3};
-use ray_runtime::format::Encoding;
+use ray_runtime::format::Form;
 use ray_runtime::{MeasureError, PixelPoint, RayBlob};
 
 /// Turned by 0.2 rad about y and -0.3 rad about z.
@@ -38,15 +38,17 @@ fn turned() -> [f32; 9] {
 
 /// A central camera and one that is not, their pair, and a camera of which nothing is known.
 fn content() -> TestBlob {
+    content_of(Form::Spline)
+}
+
+fn content_of(form: Form) -> TestBlob {
+    let mut first = TestCamera::new("first", -80.0);
+    first.encoding = encoding(form, true);
     let mut second = TestCamera::new("second", 90.0);
-    second.encoding = Encoding::NonCentralF32;
+    second.encoding = encoding(form, false);
     second.offset_mm = [4.0, -2.5];
     second.rotation = turned();
-    let mut blob = TestBlob::new(vec![
-        TestCamera::new("first", -80.0),
-        second,
-        TestCamera::new("third", 10.0),
-    ]);
+    let mut blob = TestBlob::new(vec![first, second, TestCamera::new("third", 10.0)]);
     blob.pairs = vec![TestPair::new([0, 1])];
     blob
 }
@@ -118,7 +120,13 @@ fn assert_near(found: &Matrix3<f32>, expected: &Matrix3<f64>, what: &str) {
 
 #[test]
 fn covariance_is_carried_by_the_derivative_of_the_point() {
-    let bytes = content().bytes();
+    for form in [Form::Spline, Form::Patches, Form::Quantized] {
+        covariance_is_carried(form);
+    }
+}
+
+fn covariance_is_carried(form: Form) {
+    let bytes = content_of(form).bytes();
     let blob = RayBlob::open(bytes.bytes()).unwrap();
     for pixels in matches(&blob) {
         let (a, b) = ((0, at(pixels[0])), (1, at(pixels[1])));

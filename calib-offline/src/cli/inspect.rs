@@ -292,7 +292,7 @@ fn blob_object(blob: &RayBlob<'_>) -> BlobObject {
                     camera.region.height,
                 ],
                 cells: camera.cells,
-                central: camera.is_central,
+                central: camera.encoding.is_central,
                 position_mm: camera.rig_from_camera.translation_mm.into(),
             })
             .collect(),

@@ -6,27 +6,35 @@ use super::output::Console;
 use super::place::check_file;
 use crate::atomic_file;
 use crate::error::Error;
-use crate::pack::{Deviation, PackSettings, pack};
+use crate::pack::{
+    CurvePoint, Deviation, LOOSEST_PX, PackSettings, Prefer, pack, pack_within_bytes,
+};
 use crate::report::Calibration;
 use crate::report::text::short;
-use clap::Args;
-use ray_runtime::format::MAGIC;
+use clap::{Args, ValueEnum};
+use ray_runtime::format::{Form, MAGIC};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 const EXAMPLE: &str = "\
 Example:
-  calib-offline pack results/calibration.json -o small.rays --max-error-px 0.01";
+  calib-offline pack results/calibration.json -o small.rays --max-error-px 0.01
+  calib-offline pack results/calibration.json -o fast.rays --prefer speed
+  calib-offline pack results/calibration.json -o tiny.rays --max-bytes 2048";
 
 const FORMATS: &str = "\
-Every pixel of the calibrated area is looked up in the finished blob and compared with the
-calibration: none is further off than the bound. The uncertainty goes with it on a coarse grid; how
+Every pixel of the calibrated area, and quarter pixels along its edge, are looked up in the finished
+blob and compared with the calibration: none is further off than the bound. With --max-bytes and no
+bound, the smallest error that fits is taken. --prefer size stores a polynomial and the quantized knots
+of what it leaves; --prefer speed a cubic for each cell, which takes fewer instructions and several
+times the bytes (ray-runtime/COST.md has both). The uncertainty goes with it on a coarse grid; how
 far that changes predicted standard deviations is measured and said. An earlier blob is replaced;
 any other file only with --force.
 
-With --json: schema calib-offline/pack/1, output, bytes, max_error_px (asked for), worst_error_px
-(found), cameras (name, cells, bytes, worst_error_px), pairs (cameras, nodes, bytes; sigma_error and
-calibration_sigma_error: rms and worst, relative), curve (pairs of table bytes and error, px).";
+With --json: schema calib-offline/pack/2, output, bytes, max_error_px (asked for; null with only
+--max-bytes), worst_error_px and worst_error_mm (found; mm at the working distance), cameras (name,
+form, central, cells, bytes, worst_error_px, worst_error_mm), pairs (cameras, nodes, bytes; sigma_error
+and calibration_sigma_error: rms and worst, relative), curve (bytes of all tables, error_px, error_mm).";
 
 /// The arguments.
 #[derive(Debug, Args)]
@@ -38,9 +46,15 @@ pub struct PackArgs {
     /// Where to write the blob
     #[arg(short, long, value_name = "RIG.rays")]
     pub output: PathBuf,
-    /// No ray may be further off than this, px
-    #[arg(long, value_name = "E", default_value_t = BLOB_MAX_ERROR_PX)]
-    pub max_error_px: f64,
+    /// No ray may be further off than this, px [default: 0.001, or what fits into --max-bytes]
+    #[arg(long, value_name = "E")]
+    pub max_error_px: Option<f64>,
+    /// The blob may have no more bytes than this
+    #[arg(long, value_name = "B")]
+    pub max_bytes: Option<usize>,
+    /// What matters within these limits
+    #[arg(long, value_name = "WHAT", value_enum, default_value_t = PreferArg::Size)]
+    pub prefer: PreferArg,
     /// Leave out the uncertainty: a smaller blob, and no sigma from it
     #[arg(long)]
     pub no_uncertainty: bool,
@@ -49,25 +63,45 @@ pub struct PackArgs {
     pub force: bool,
 }
 
+/// What matters among tables within the limits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PreferArg {
+    /// The fewest bytes
+    Size,
+    /// The fewest instructions per lookup
+    Speed,
+}
+
 /// What `--json` prints.
 #[derive(Debug, Serialize)]
 struct PackObject<'a> {
     schema: &'static str,
     output: &'a Path,
     bytes: usize,
-    max_error_px: f64,
+    max_error_px: Option<f64>,
     worst_error_px: f64,
+    worst_error_mm: f64,
     cameras: Vec<PackedCamera>,
     pairs: Vec<PairObject>,
-    curve: Vec<(usize, f64)>,
+    curve: Vec<CurveObject>,
 }
 
 #[derive(Debug, Serialize)]
 struct PackedCamera {
     name: String,
+    form: &'static str,
+    central: bool,
     cells: [u32; 2],
     bytes: usize,
     worst_error_px: f64,
+    worst_error_mm: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct CurveObject {
+    bytes: usize,
+    error_px: f64,
+    error_mm: f64,
 }
 
 #[derive(Debug, Serialize)]
@@ -87,28 +121,50 @@ pub fn run(args: &PackArgs, console: &Console) -> Result<Outcome, Error> {
     check_file(&args.output, &MAGIC, &[&args.calibration], args.force)?;
     let calibration = Calibration::load(&args.calibration)?;
     console.progress().begin("packing the blob", 0);
+    let default_px = match args.max_bytes {
+        Some(_) => LOOSEST_PX,
+        None => BLOB_MAX_ERROR_PX,
+    };
+    let max_error_px = args.max_error_px.unwrap_or(default_px);
     let settings = PackSettings {
         with_uncertainty: !args.no_uncertainty,
-        ..pack_settings(&calibration, args.max_error_px)
+        prefer: match args.prefer {
+            PreferArg::Size => Prefer::Size,
+            PreferArg::Speed => Prefer::Speed,
+        },
+        ..pack_settings(&calibration, max_error_px)
     };
-    let packed = pack(&calibration.rig, &settings);
+    let rig = &calibration.rig;
+    let packed = match args.max_bytes {
+        Some(max_bytes) if args.max_error_px.is_none() => {
+            pack_within_bytes(rig, &settings, max_bytes)
+        }
+        Some(max_bytes) => pack(rig, &settings).and_then(|packed| packed.within(max_bytes)),
+        None => pack(rig, &settings),
+    };
     console.progress().end();
     let packed = packed?;
     atomic_file::write(&args.output, &packed.bytes)?;
     let object = PackObject {
-        schema: "calib-offline/pack/1",
+        schema: "calib-offline/pack/2",
         output: &args.output,
         bytes: packed.bytes.len(),
-        max_error_px: args.max_error_px,
+        max_error_px: args
+            .max_error_px
+            .or(args.max_bytes.is_none().then_some(default_px)),
         worst_error_px: packed.worst_error_px,
+        worst_error_mm: packed.worst_error_mm,
         cameras: packed
-            .grids
+            .tables
             .into_iter()
-            .map(|grid| PackedCamera {
-                name: grid.camera,
-                cells: grid.cells,
-                bytes: grid.bytes,
-                worst_error_px: grid.proof.worst_error_px,
+            .map(|table| PackedCamera {
+                name: table.camera,
+                form: form_name(table.encoding.form),
+                central: table.encoding.is_central,
+                cells: table.cells,
+                bytes: table.bytes,
+                worst_error_px: table.proof.worst_error_px,
+                worst_error_mm: table.proof.worst_error_mm,
             })
             .collect(),
         pairs: packed
@@ -122,18 +178,42 @@ pub fn run(args: &PackArgs, console: &Console) -> Result<Outcome, Error> {
                 calibration_sigma_error: pair.calibration_sigma_error,
             })
             .collect(),
-        curve: packed.curve,
+        curve: packed.curve.into_iter().map(CurveObject::from).collect(),
     };
     let uncertainty: String = object.pairs.iter().map(pair_words).collect();
+    let asked = match (args.max_error_px, args.max_bytes) {
+        (None, Some(bytes)) => format!("at most {bytes} bytes"),
+        (_, Some(bytes)) => format!("{max_error_px} px in at most {bytes} bytes"),
+        (_, None) => format!("{max_error_px} px"),
+    };
     let words = format!(
-        "{} bytes, every ray within {} px (asked for: {} px){uncertainty}; written to {}",
+        "{} bytes, every ray within {} px, {} mm at the working distance (asked for: {asked}){uncertainty}; written to {}",
         object.bytes,
         short(object.worst_error_px),
-        args.max_error_px,
+        short(object.worst_error_mm),
         args.output.display()
     );
     console.result(&words, &object);
     Ok(Outcome::Done)
+}
+
+/// The name of a form in JSON, here and in `inspect`.
+pub(super) const fn form_name(form: Form) -> &'static str {
+    match form {
+        Form::Spline => "spline",
+        Form::Patches => "patches",
+        Form::Quantized => "quantized",
+    }
+}
+
+impl From<CurvePoint> for CurveObject {
+    fn from(point: CurvePoint) -> Self {
+        Self {
+            bytes: point.bytes,
+            error_px: point.error_px,
+            error_mm: point.error_mm,
+        }
+    }
 }
 
 fn pair_words(pair: &PairObject) -> String {

@@ -1,6 +1,7 @@
 //! The bytes of a blob, by the runtime's own schema.
 
-use super::{ControlGrid, PackError};
+use super::PackError;
+use super::table::Table;
 use crate::field::{CalibratedCamera, CoverageMask, Rig};
 use ray_runtime::OpenError;
 use ray_runtime::format::{
@@ -26,16 +27,16 @@ pub struct BlobParts<'a> {
 }
 
 impl BlobParts<'_> {
-    /// The blob of these cameras; `grids` in their order.
+    /// The blob of these cameras; `tables` in their order.
     ///
     /// # Errors
     /// [`PackError::TooLarge`]; what else may be wrong, `RayBlob::open` finds.
     pub fn encode<'g>(
         &self,
         rig: &Rig,
-        grids: impl Iterator<Item = &'g ControlGrid>,
+        tables: impl Iterator<Item = &'g Table>,
     ) -> Result<Vec<u8>, PackError> {
-        let cameras: Vec<_> = rig.cameras.iter().zip(grids).collect();
+        let cameras: Vec<_> = rig.cameras.iter().zip(tables).collect();
         self.encode_cameras(&cameras)
     }
 
@@ -45,21 +46,21 @@ impl BlobParts<'_> {
     /// As [`encode`](Self::encode).
     pub fn encode_cameras(
         &self,
-        cameras: &[(&CalibratedCamera, &ControlGrid)],
+        cameras: &[(&CalibratedCamera, &Table)],
     ) -> Result<Vec<u8>, PackError> {
         let meta = self.metadata(cameras)?;
         let records_start = format::aligned(HEADER_LEN + meta.len());
         let tables_start = records_start + cameras.len() * RECORD_LEN;
 
         let (mut records, mut tables) = (Vec::new(), Vec::new());
-        for (camera, grid) in cameras {
+        for (camera, table) in cameras {
             let grid_offset = tables_start + tables.len();
-            push_grid(&mut tables, grid);
+            tables.extend(&table.bytes);
             pad(&mut tables);
             let mask_offset = tables_start + tables.len();
             push_mask(&mut tables, &camera.coverage);
             pad(&mut tables);
-            let record = record(camera, grid, length(grid_offset)?, length(mask_offset)?);
+            let record = record(camera, table, length(grid_offset)?, length(mask_offset)?);
             records.extend(record.to_words().iter().flat_map(|word| word.to_le_bytes()));
         }
 
@@ -89,10 +90,7 @@ impl BlobParts<'_> {
     }
 
     /// The postcard messages, one behind the other.
-    fn metadata(
-        &self,
-        cameras: &[(&CalibratedCamera, &ControlGrid)],
-    ) -> Result<Vec<u8>, PackError> {
+    fn metadata(&self, cameras: &[(&CalibratedCamera, &Table)]) -> Result<Vec<u8>, PackError> {
         let meta = Meta {
             identity: &self.identity,
             frame: self.frame,
@@ -132,7 +130,7 @@ fn message(bytes: Vec<u8>, value: &impl Serialize) -> Result<Vec<u8>, PackError>
 
 fn record(
     camera: &CalibratedCamera,
-    grid: &ControlGrid,
+    table: &Table,
     grid_offset: u32,
     mask_offset: u32,
 ) -> RecordFields {
@@ -140,26 +138,17 @@ fn record(
     let mask_cells = [mask.cells_u as u32, mask.cells_v as u32];
     let pose = &camera.rig_from_camera;
     RecordFields {
-        encoding: grid.encoding.number(),
-        cells: grid.cells,
+        encoding: table.encoding.number(),
+        cells: table.cells,
         mask_cells,
         grid_offset,
         mask_offset,
         axes: [
-            Axis::new(0, sensor.width, grid.cells[0], mask_cells[0]),
-            Axis::new(0, sensor.height, grid.cells[1], mask_cells[1]),
+            Axis::new(0, sensor.width, table.cells[0], mask_cells[0]),
+            Axis::new(0, sensor.height, table.cells[1], mask_cells[1]),
         ],
         rotation: std::array::from_fn(|k| pose.rotation[(k / 3, k % 3)] as f32),
         translation_mm: std::array::from_fn(|k| pose.translation_mm[k] as f32),
-    }
-}
-
-fn push_grid(tables: &mut Vec<u8>, grid: &ControlGrid) {
-    let channels = grid.encoding.channels();
-    for knot in &grid.knots {
-        for number in &knot[..channels] {
-            tables.extend((*number as f32).to_le_bytes());
-        }
     }
 }
 

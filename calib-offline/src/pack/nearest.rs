@@ -1,4 +1,4 @@
-//! A blob all the same, where the bound cannot be held.
+//! A blob all the same, where the bound cannot be held, and the best blob of a size.
 
 use super::{PackError, PackSettings, Packed, pack};
 use crate::field::Rig;
@@ -27,4 +27,52 @@ pub fn pack_nearest(rig: &Rig, settings: &PackSettings) -> Result<Packed, PackEr
         }
     }
     pack(rig, &settings)
+}
+
+/// The tightest bound tried for a size, px.
+const TIGHTEST_PX: f64 = 0.000_5;
+/// The loosest bound tried for a size, px.
+pub const LOOSEST_PX: f64 = 1.0;
+/// Steps between them, each by the same factor.
+const STEPS: u32 = 44;
+
+/// Packs a rig into no more bytes than `max_bytes`, with the smallest error that this allows: each
+/// bound tried is a fifth looser than the one before. The bound of the settings is the loosest that is
+/// accepted.
+///
+/// # Errors
+/// [`PackError::TooFewBytes`] with the bytes that the loosest bound takes, and any other of [`pack`].
+pub fn pack_within_bytes(
+    rig: &Rig,
+    settings: &PackSettings,
+    max_bytes: usize,
+) -> Result<Packed, PackError> {
+    let loosest_px = settings.max_error_px.min(LOOSEST_PX);
+    let factor = (LOOSEST_PX / TIGHTEST_PX).powf(1.0 / f64::from(STEPS));
+    let attempt = |max_error_px: f64| {
+        let settings = PackSettings {
+            max_error_px,
+            ..*settings
+        };
+        pack(rig, &settings)
+    };
+    let mut best = attempt(loosest_px)?.within(max_bytes)?;
+    // By halving: the size grows as the bound gets tighter, but for small ripples.
+    let bounds: Vec<f64> = (0..STEPS)
+        .map(|k| TIGHTEST_PX * factor.powi(k as i32))
+        .filter(|bound_px| *bound_px < loosest_px)
+        .collect();
+    let (mut low, mut high) = (0, bounds.len());
+    while low < high {
+        let middle = usize::midpoint(low, high);
+        match attempt(bounds[middle]) {
+            Ok(packed) if packed.bytes.len() <= max_bytes => {
+                high = middle;
+                best = packed;
+            }
+            Ok(_) | Err(PackError::BoundNotReached { .. }) => low = middle + 1,
+            Err(other) => return Err(other),
+        }
+    }
+    Ok(best)
 }

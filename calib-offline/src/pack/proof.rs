@@ -20,6 +20,8 @@ pub struct Proof {
     pub worst_error_px: f64,
     /// Where it is.
     pub worst_at: PixelPoint,
+    /// Largest distance between a ray and the field's at the working distance, mm.
+    pub worst_error_mm: f64,
     /// Root mean square over the pixels compared, px.
     pub rms_error_px: f64,
     /// How many pixels were compared.
@@ -41,38 +43,80 @@ pub fn prove(
         &camera.field,
         columns.iter().map(|u| f64::from(*u)).collect(),
     );
-    let judge = Judge {
-        camera,
-        working_distance_mm,
-        max_px_per_mm: 10.0 * usual_px_per_mm(camera, working_distance_mm),
-    };
+    let judge = Judge::new(camera, blob, camera_idx, working_distance_mm);
     rows.par_iter()
         .map(|&v| {
             let row = field.row(f64::from(v));
-            let mut part = Proof::empty();
-            for (k, &u) in columns.iter().enumerate() {
+            let compared = columns.iter().enumerate().filter_map(|(k, &u)| {
                 let pixel = PixelPoint::new(f64::from(u), f64::from(v));
-                let device_pixel = ray_runtime::PixelPoint::new(u as f32, v as f32);
-                let ray = blob.lookup(camera_idx, device_pixel).ok();
-                let error_px = match (camera.coverage.contains(pixel), ray) {
-                    (true, Some(ray)) => judge.error_px(&row.sample(k), &ray),
-                    (false, None) => continue,
-                    // The masks differ.
-                    (true, None) | (false, Some(_)) => f64::INFINITY,
-                };
-                part = part.merged(Proof {
-                    worst_error_px: error_px,
-                    worst_at: pixel,
-                    rms_error_px: error_px,
-                    pixel_count: 1,
-                });
-            }
-            part
+                judge.compare(pixel, || row.sample(k))
+            });
+            compared.fold(Proof::empty(), Proof::merged)
         })
         .collect::<Vec<_>>()
         .into_iter()
         .fold(Proof::empty(), Proof::merged)
 }
+
+/// Compares quarter pixels on both sides of every border between calibrated and other cells of the
+/// mask, and along the edge of the sensor: half a pixel to each side, where tables end.
+pub fn prove_edges(
+    camera: &CalibratedCamera,
+    blob: &RayBlob<'_>,
+    camera_idx: usize,
+    working_distance_mm: f64,
+) -> Proof {
+    let judge = Judge::new(camera, blob, camera_idx, working_distance_mm);
+    let mask = &camera.coverage;
+    let (width_px, height_px) = mask.cell_size_px();
+    let is_covered = |i: Option<usize>, j: Option<usize>| {
+        let (Some(i), Some(j)) = (i, j) else {
+            return false;
+        };
+        i < mask.cells_u && j < mask.cells_v && mask.covered[j * mask.cells_u + i]
+    };
+    // Each border once, as the left or upper edge of the cell behind it: where it starts, and
+    // whether it runs along v.
+    let mut borders = Vec::new();
+    for j in 0..=mask.cells_v {
+        for i in 0..=mask.cells_u {
+            let own = is_covered(Some(i), Some(j));
+            let corner = [i as f64 * width_px - 0.5, j as f64 * height_px - 0.5];
+            if j < mask.cells_v && own != is_covered(i.checked_sub(1), Some(j)) {
+                borders.push((corner, true));
+            }
+            if i < mask.cells_u && own != is_covered(Some(i), j.checked_sub(1)) {
+                borders.push((corner, false));
+            }
+        }
+    }
+    borders
+        .par_iter()
+        .map(|&([u, v], is_along_v)| {
+            let length_px = if is_along_v { height_px } else { width_px };
+            let steps = (length_px / QUARTER_PX).floor() as usize;
+            let quarter = |x: f64| (x / QUARTER_PX).round() * QUARTER_PX;
+            let places = (0..=steps).flat_map(|along| (-2..=2).map(move |across| (along, across)));
+            let pixels = places.map(|(along, across)| {
+                let (along, across) = (along as f64 * QUARTER_PX, f64::from(across) * QUARTER_PX);
+                let (du, dv) = if is_along_v {
+                    (across, along)
+                } else {
+                    (along, across)
+                };
+                PixelPoint::new(quarter(u) + du, quarter(v) + dv)
+            });
+            pixels
+                .filter_map(|pixel| judge.compare(pixel, || camera.field.sample(pixel)))
+                .fold(Proof::empty(), Proof::merged)
+        })
+        .collect::<Vec<_>>()
+        .into_iter()
+        .fold(Proof::empty(), Proof::merged)
+}
+
+/// f32 holds quarter pixels exactly.
+const QUARTER_PX: f64 = 0.25;
 
 /// 0, stride, 2 stride ... and the last one.
 fn strided(extent: u32, stride: usize) -> impl Iterator<Item = u32> {
@@ -84,12 +128,14 @@ impl Proof {
         Self {
             worst_error_px: 0.0,
             worst_at: PixelPoint::new(0.0, 0.0),
+            worst_error_mm: 0.0,
             rms_error_px: 0.0,
             pixel_count: 0,
         }
     }
 
-    fn merged(self, other: Self) -> Self {
+    /// Both together.
+    pub fn merged(self, other: Self) -> Self {
         let is_worse = other.worst_error_px > self.worst_error_px;
         let sum_of_squares = |p: &Self| p.rms_error_px * p.rms_error_px * p.pixel_count as f64;
         let count = self.pixel_count + other.pixel_count;
@@ -98,21 +144,59 @@ impl Proof {
         Self {
             worst_error_px: worst.worst_error_px,
             worst_at: worst.worst_at,
+            worst_error_mm: self.worst_error_mm.max(other.worst_error_mm),
             rms_error_px: (sum / count.max(1) as f64).sqrt(),
             pixel_count: count,
         }
     }
 }
 
-/// Turns the difference of two rays into pixels.
+/// Compares rays of a blob with the field's.
 struct Judge<'a> {
     camera: &'a CalibratedCamera,
+    blob: &'a RayBlob<'a>,
+    camera_idx: usize,
     working_distance_mm: f64,
     max_px_per_mm: f64,
 }
 
-impl Judge<'_> {
-    fn error_px(&self, exact: &FieldSample, ray: &ray_runtime::Ray) -> f64 {
+impl<'a> Judge<'a> {
+    fn new(
+        camera: &'a CalibratedCamera,
+        blob: &'a RayBlob<'a>,
+        camera_idx: usize,
+        working_distance_mm: f64,
+    ) -> Self {
+        Self {
+            camera,
+            blob,
+            camera_idx,
+            working_distance_mm,
+            max_px_per_mm: 10.0 * usual_px_per_mm(camera, working_distance_mm),
+        }
+    }
+
+    /// The comparison of one pixel; `None` where neither the blob nor the calibration has a ray.
+    fn compare(&self, pixel: PixelPoint, exact: impl FnOnce() -> FieldSample) -> Option<Proof> {
+        let device_pixel = ray_runtime::PixelPoint::new(pixel.u as f32, pixel.v as f32);
+        let ray = self.blob.lookup(self.camera_idx, device_pixel).ok();
+        let [error_px, error_mm] = match (self.camera.coverage.contains(pixel), ray) {
+            (true, Some(ray)) => self.errors(&exact(), &ray),
+            (false, None) => return None,
+            // The masks differ.
+            (true, None) | (false, Some(_)) => [f64::INFINITY; 2],
+        };
+        Some(Proof {
+            worst_error_px: error_px,
+            worst_at: pixel,
+            worst_error_mm: error_mm,
+            rms_error_px: error_px,
+            pixel_count: 1,
+        })
+    }
+
+    /// In px, and at the working distance in mm.
+    fn errors(&self, exact: &FieldSample, ray: &ray_runtime::Ray) -> [f64; 2] {
         let rig_from_camera = &self.camera.rig_from_camera;
         let turned_back = rig_from_camera.rotation.transpose();
         let origin = ray.origin_mm.map(f64::from) - rig_from_camera.translation_mm;
@@ -121,7 +205,7 @@ impl Judge<'_> {
         let origin = local_from_rig * origin;
         let direction = local_from_rig * ray.direction.map(f64::from);
         if direction.z <= 0.0 {
-            return f64::INFINITY;
+            return [f64::INFINITY; 2];
         }
         let slope = direction.xy() / direction.z;
         let direction_error_mm = slope * self.working_distance_mm;
@@ -130,12 +214,9 @@ impl Judge<'_> {
         let px_from_mm = px_from_mm(exact, self.working_distance_mm);
         let error_px =
             self.in_px(px_from_mm, direction_error_mm) + self.in_px(px_from_mm, offset_error_mm);
+        let error_mm = direction_error_mm.norm() + offset_error_mm.norm();
         // A field that is no number somewhere cannot have been packed.
-        if error_px.is_nan() {
-            f64::INFINITY
-        } else {
-            error_px
-        }
+        [error_px, error_mm].map(|error| if error.is_nan() { f64::INFINITY } else { error })
     }
 
     fn in_px(&self, px_from_mm: Option<Matrix2<f64>>, error_mm: Vector2<f64>) -> f64 {
@@ -158,7 +239,7 @@ fn px_from_mm(sample: &FieldSample, distance_mm: f64) -> Option<Matrix2<f64>> {
 }
 
 /// Median px per mm over a coarse lattice of the calibrated area.
-fn usual_px_per_mm(camera: &CalibratedCamera, distance_mm: f64) -> f64 {
+pub fn usual_px_per_mm(camera: &CalibratedCamera, distance_mm: f64) -> f64 {
     const STEPS: u32 = 24;
     let sensor = camera.field.sensor;
     let at =

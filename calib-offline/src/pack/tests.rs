@@ -105,7 +105,19 @@ fn settings(max_error_px: f64) -> PackSettings {
 
 /// Packs one camera and opens the blob.
 fn packed_alone(camera: CalibratedCamera, max_error_px: f64) -> (Packed, AlignedBytes) {
-    let packed = pack(&rig(vec![camera]), &settings(max_error_px)).unwrap();
+    packed_for(Prefer::Size, camera, max_error_px)
+}
+
+fn packed_for(
+    prefer: Prefer,
+    camera: CalibratedCamera,
+    max_error_px: f64,
+) -> (Packed, AlignedBytes) {
+    let settings = PackSettings {
+        prefer,
+        ..settings(max_error_px)
+    };
+    let packed = pack(&rig(vec![camera]), &settings).unwrap();
     let bytes = AlignedBytes::from(packed.bytes.as_slice());
     (packed, bytes)
 }
@@ -125,24 +137,26 @@ fn every_kind_of_lens_holds_the_bound_and_says_so_in_the_blob() {
     for camera in lenses {
         for max_error_px in [0.01, 0.001] {
             let covered = camera.coverage.clone();
-            let (packed, bytes) = packed_alone(camera.clone(), max_error_px);
-            let name = &camera.name;
-            assert!(packed.worst_error_px <= max_error_px, "{name}");
-            let blob = RayBlob::open(&bytes).unwrap();
-            let stated = f64::from(blob.max_error_px());
-            assert!(stated >= packed.worst_error_px && stated <= max_error_px * 1.000001);
-            let pixels = (0..SENSOR.height)
-                .flat_map(|v| (0..SENSOR.width).map(move |u| (f64::from(u), f64::from(v))));
-            let calibrated = pixels.filter(|(u, v)| covered.contains(PixelPoint::new(*u, *v)));
-            assert_eq!(
-                packed.grids[0].proof.pixel_count,
-                calibrated.count(),
-                "{name}"
-            );
-            assert_eq!(
-                blob.camera(0).unwrap().is_central,
-                camera.field.is_central()
-            );
+            for prefer in [Prefer::Size, Prefer::Speed] {
+                let (packed, bytes) = packed_for(prefer, camera.clone(), max_error_px);
+                let name = &camera.name;
+                assert!(packed.worst_error_px <= max_error_px, "{name}");
+                let blob = RayBlob::open(&bytes).unwrap();
+                let stated = f64::from(blob.max_error_px());
+                assert!(stated >= packed.worst_error_px && stated <= max_error_px * 1.000001);
+                let pixels = (0..SENSOR.height)
+                    .flat_map(|v| (0..SENSOR.width).map(move |u| (f64::from(u), f64::from(v))));
+                let calibrated = pixels.filter(|(u, v)| covered.contains(PixelPoint::new(*u, *v)));
+                // Those along the edge besides.
+                assert!(
+                    packed.tables[0].proof.pixel_count > calibrated.count(),
+                    "{name}"
+                );
+                assert_eq!(
+                    blob.camera(0).unwrap().encoding.is_central,
+                    camera.field.is_central()
+                );
+            }
         }
     }
 }
@@ -159,11 +173,34 @@ fn local_bumps_are_packed_on_their_own_grid() {
     let own = camera.field.direction.spline.as_ref().unwrap().grid;
     let (packed, _) = packed_alone(camera, 0.01);
     let expected = [own.cells_u as u32, own.cells_v as u32];
-    assert_eq!(packed.grids[0].cells, expected);
-    // Exact but for round-off, where the size before it is off by more than the bound.
-    assert!(packed.worst_error_px < 0.0005);
-    let before = packed.grids[0].tried.iter().rev().nth(1).unwrap();
-    assert!(before.1 > 0.01, "{before:?}");
+    assert_eq!(packed.tables[0].cells, expected);
+    // Exact but for the step of the knots, where other sizes of their form are off by more.
+    let tried = &packed.tables[0].tried;
+    let smaller = tried
+        .iter()
+        .filter(|t| t.cells != [1, 1] && t.cells < expected);
+    assert!(smaller.clone().count() > 0);
+    assert!(smaller.clone().all(|t| t.error_px > 0.01), "{tried:?}");
+}
+
+#[test]
+fn bytes_buy_accuracy_and_too_few_are_refused_with_the_need() {
+    let cameras = || rig(vec![smooth_camera(), port_camera()]);
+    let loose = settings(LOOSEST_PX);
+    let errors = [1800, 2400].map(|max_bytes| {
+        let packed = pack_within_bytes(&cameras(), &loose, max_bytes).unwrap();
+        assert!(packed.bytes.len() <= max_bytes);
+        packed.worst_error_px
+    });
+    assert!(
+        errors[1] < errors[0] && errors[0] < LOOSEST_PX,
+        "{errors:?}"
+    );
+    let error = pack_within_bytes(&cameras(), &loose, 500).unwrap_err();
+    let PackError::TooFewBytes { need, .. } = error else {
+        panic!("{error}");
+    };
+    assert!(pack_within_bytes(&cameras(), &loose, need).is_ok());
 }
 
 #[test]
@@ -172,8 +209,10 @@ fn knots_outside_the_calibrated_area_stay_small() {
     let corner = camera.field.sample(PixelPoint::new(0.0, 0.0)).s.norm();
     assert!(corner > 5.0, "{corner}");
     for cells in [[16, 13], [40, 32]] {
-        let grid = grid::fit(&camera, cells).unwrap();
-        let largest = grid
+        let target = table::Target::new(&camera);
+        let spline = residual_spline::ResidualSpline::new(&camera, &target, cells);
+        let fitted = spline.fit(|_| [0.0; 4]).unwrap();
+        let largest = fitted
             .knots
             .iter()
             .flatten()
@@ -227,8 +266,8 @@ fn six_thousand_pixels_are_within_a_thousandth() {
         Vector3::new(100.0, 20.0, -600.0),
     );
     let big = camera("big", distorted_field(sensor, 6000.0), pose);
-    let grid = grid::fit(&big, [41, 27]).unwrap();
-    let bytes = parts().encode_cameras(&[(&big, &grid)]).unwrap();
+    let table = patches::fit(&big, [41, 27]).unwrap();
+    let bytes = parts().encode_cameras(&[(&big, &table)]).unwrap();
     let bytes = AlignedBytes::from(bytes.as_slice());
     let proof = proof::prove(&big, &RayBlob::open(&bytes).unwrap(), 0, 600.0, 5);
     assert!(proof.worst_error_px < 0.001, "{proof:?}");
@@ -250,9 +289,9 @@ fn parts() -> encode::BlobParts<'static> {
 #[test]
 fn the_proof_finds_an_error_that_was_put_in() {
     let exact = smooth_camera();
-    let grid = grid::fit(&exact, [20, 16]).unwrap();
+    let table = patches::fit(&exact, [20, 16]).unwrap();
     let prove_as = |truth: &CalibratedCamera| {
-        let bytes = parts().encode_cameras(&[(&exact, &grid)]).unwrap();
+        let bytes = parts().encode_cameras(&[(&exact, &table)]).unwrap();
         let bytes = AlignedBytes::from(bytes.as_slice());
         proof::prove(truth, &RayBlob::open(&bytes).unwrap(), 0, 600.0, 9)
     };
@@ -353,11 +392,13 @@ fn the_blob_says_what_it_is() {
     assert_eq!((left.sensor_width, left.sensor_height), (1280, 1024));
     // Two rays for each camera, four matches.
     assert_eq!(blob.run_self_tests(), Ok(8));
-    assert_eq!(packed.grids[1].camera, "port");
-    let (last_bytes, last_px) = *packed.curve.last().unwrap();
-    assert!(last_px <= 0.001 && last_bytes < packed.bytes.len() * 2);
+    assert_eq!(packed.tables[1].camera, "port");
+    let last = packed.curve.last().unwrap();
+    assert!(last.error_px <= 0.001 && last.bytes < packed.bytes.len() * 2);
     assert!(
-        packed.curve.is_sorted_by(|a, b| a.0 < b.0 && a.1 > b.1),
+        packed
+            .curve
+            .is_sorted_by(|a, b| a.bytes < b.bytes && a.error_px > b.error_px),
         "{:?}",
         packed.curve
     );

@@ -4,8 +4,8 @@
 #![allow(dead_code)]
 
 use ray_runtime::format::{
-    self, Axis, CameraMeta, Encoding, HEADER_LEN, Header, LengthUnit, Meta, PairHeader,
-    PixelConvention, RECORD_LEN, RecordFields, SelfTest, VERSION,
+    self, Axis, CameraMeta, Encoding, Form, HEADER_LEN, Header, LengthUnit, Meta, PairHeader,
+    PixelConvention, QuantizedHeader, QuantizedMap, RECORD_LEN, RecordFields, SelfTest, VERSION,
 };
 
 /// Bytes that start on a multiple of 8.
@@ -41,7 +41,11 @@ impl AlignedBytes {
     }
 }
 
-/// A camera whose half-angle vector is linear in the pixel: the spline reproduces it.
+pub const fn encoding(form: Form, is_central: bool) -> Encoding {
+    Encoding { form, is_central }
+}
+
+/// A camera whose half-angle vector is linear in the pixel: every form reproduces it.
 #[derive(Clone)]
 pub struct TestCamera {
     pub name: &'static str,
@@ -71,7 +75,7 @@ impl TestCamera {
             cells: [3, 2],
             mask_cells: [4, 3],
             mask: vec![true; 12],
-            encoding: Encoding::CentralF32,
+            encoding: encoding(Form::Spline, true),
             focal_px: 50.0,
             offset_mm: [0.0; 2],
             rotation: IDENTITY,
@@ -101,20 +105,95 @@ impl TestCamera {
         ]
     }
 
-    fn grid(&self) -> Vec<u8> {
-        let [u0, v0, width, height] = self.region.map(|x| x as f32);
+    /// Half-angle vector, and the offset if there is one, at a pixel of the region.
+    fn numbers(&self, u: f32, v: f32) -> Vec<f32> {
+        let [s1, s2] = self.s(u, v);
+        let numbers = [s1, s2, self.offset_mm[0], self.offset_mm[1]];
+        numbers[..self.encoding.channels()].to_vec()
+    }
+
+    /// Outer edge of cell `i` along an axis, px.
+    fn edge(&self, axis: usize, i: f32) -> f32 {
+        let (first, extent) = (self.region[axis] as f32, self.region[axis + 2] as f32);
+        first - 0.5 + i * extent / self.cells[axis] as f32
+    }
+
+    /// Where a lookup finds this share of cell `i`, px.
+    fn at_share(&self, axis: usize, i: u32, share: f32) -> f32 {
+        let (first, extent) = (self.region[axis], self.region[axis + 2]);
+        let numbers = Axis::new(first, extent, self.cells[axis], self.mask_cells[axis]);
+        numbers.min_px + i as f32 * numbers.cell_high_px + share / numbers.cells_per_px
+    }
+
+    fn table(&self) -> Vec<u8> {
+        let f32_bytes = |numbers: Vec<f32>| numbers.into_iter().flat_map(f32::to_le_bytes);
         let [cells_u, cells_v] = self.cells;
         let mut bytes = Vec::new();
-        for j in 0..cells_v + 3 {
-            for i in 0..cells_u + 3 {
-                // A B-spline whose knots hold a linear function is that linear function.
-                let u = u0 - 0.5 + (i as f32 - 1.0) * width / cells_u as f32;
-                let v = v0 - 0.5 + (j as f32 - 1.0) * height / cells_v as f32;
-                let [s1, s2] = self.s(u, v);
-                let numbers = [s1, s2, self.offset_mm[0], self.offset_mm[1]];
-                for number in &numbers[..self.encoding.channels()] {
-                    bytes.extend(number.to_le_bytes());
+        match self.encoding.form {
+            // A B-spline whose knots hold a linear function is that linear function.
+            Form::Spline => {
+                for j in 0..cells_v + 3 {
+                    for i in 0..cells_u + 3 {
+                        let (u, v) = (self.edge(0, i as f32 - 1.0), self.edge(1, j as f32 - 1.0));
+                        bytes.extend(f32_bytes(self.numbers(u, v)));
+                    }
                 }
+            }
+            Form::Patches => {
+                for j in 0..cells_v {
+                    for i in 0..cells_u {
+                        let at = |x: f32, y: f32| {
+                            self.numbers(self.at_share(0, i, x), self.at_share(1, j, y))
+                        };
+                        let (zero, by_x, by_y) = (at(0.0, 0.0), at(1.0, 0.0), at(0.0, 1.0));
+                        for k in (0..zero.len()).step_by(2) {
+                            let mut cubic = [[0.0; 2]; 10];
+                            for c in 0..2 {
+                                cubic[5][c] = by_y[k + c] - zero[k + c];
+                                cubic[8][c] = by_x[k + c] - zero[k + c];
+                                cubic[9][c] = zero[k + c];
+                            }
+                            bytes.extend(f32_bytes(cubic.concat()));
+                        }
+                    }
+                }
+            }
+            // The polynomial has the slope along u and the middle; the knots that along v.
+            Form::Quantized => {
+                let map = |degree, number_len, step| QuantizedMap {
+                    degree,
+                    number_len,
+                    step,
+                };
+                let is_central = self.encoding.is_central;
+                let direction = map(1, 2, 1.0 / 512.0 / self.focal_px);
+                let offset = if is_central {
+                    QuantizedMap::default()
+                } else {
+                    map(0, 1, 0.25)
+                };
+                let extent = [self.region[2], self.region[3]];
+                let (header, len) =
+                    QuantizedHeader::new([direction, offset], is_central, extent, self.cells);
+                bytes.extend(header.to_bytes());
+                let middle = [0, 1].map(|axis| self.edge(axis, self.cells[axis] as f32 / 2.0));
+                let [s1, s2] = self.s(middle[0], middle[1]);
+                let slope_u = extent[0] as f32 / 2.0 / self.focal_px;
+                bytes.extend(f32_bytes(vec![0.0, 0.0, slope_u, 0.0, s1, s2]));
+                if !is_central {
+                    bytes.extend(f32_bytes(vec![self.offset_mm[0], self.offset_mm[1] - 1.0]));
+                }
+                for j in 0..cells_v + 3 {
+                    let v = self.edge(1, j as f32 - 1.0) - middle[1];
+                    let knot = [0, (512.0 * v).round() as i16];
+                    let row = knot.map(i16::to_le_bytes).concat();
+                    bytes.extend(row.repeat(cells_u as usize + 3));
+                }
+                if !is_central {
+                    bytes.resize(header.starts[2] as usize, 0);
+                    bytes.extend([0, 4].repeat(((cells_u + 3) * (cells_v + 3)) as usize));
+                }
+                bytes.resize(len, 0);
             }
         }
         bytes
@@ -207,7 +286,7 @@ impl TestBlob {
         let (mut records, mut tables) = (Vec::new(), Vec::new());
         for camera in &self.cameras {
             let grid_offset = (tables_start + tables.len()) as u32;
-            tables.extend(camera.grid());
+            tables.extend(camera.table());
             pad(&mut tables);
             let mask_offset = (tables_start + tables.len()) as u32;
             tables.extend(camera.mask_bytes());

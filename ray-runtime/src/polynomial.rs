@@ -1,0 +1,153 @@
+//! Polynomials of two variables, for two channels at once, with or without derivatives.
+//!
+//! The coefficients stand in the order of their use: by falling power of y, and within one power of y
+//! by falling power of x. Both Horner schemes, the general one and the written-out cubic, multiply
+//! and add in that order: the same bits on every target.
+
+use core::ops::{Add, Mul};
+
+/// A number with its derivatives by u and v, or without them.
+pub(crate) trait Number: Copy + From<f32> + Add<Output = Self> + Mul<Output = Self> {}
+
+impl Number for f32 {}
+
+/// A number and its derivatives by the pixel coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Dual {
+    pub value: f32,
+    pub by_u: f32,
+    pub by_v: f32,
+}
+
+impl Number for Dual {}
+
+impl From<f32> for Dual {
+    fn from(value: f32) -> Self {
+        Self {
+            value,
+            by_u: 0.0,
+            by_v: 0.0,
+        }
+    }
+}
+
+impl Add for Dual {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            value: self.value + other.value,
+            by_u: self.by_u + other.by_u,
+            by_v: self.by_v + other.by_v,
+        }
+    }
+}
+
+impl Mul for Dual {
+    type Output = Self;
+
+    fn mul(self, other: Self) -> Self {
+        Self {
+            value: self.value * other.value,
+            by_u: self.by_u * other.value + self.value * other.by_u,
+            by_v: self.by_v * other.value + self.value * other.by_v,
+        }
+    }
+}
+
+/// The polynomial whose coefficients these are; of as high a total degree as there are complete rows.
+pub(crate) fn evaluate<T: Number>(coefficients: &[[f32; 2]], x: T, y: T) -> [T; 2] {
+    let mut rest = coefficients;
+    let mut sum: [T; 2] = [0.0.into(); 2];
+    let mut row_len = 1;
+    while let Some((row, after)) = rest.split_at_checked(row_len) {
+        let mut along_x: [T; 2] = [0.0.into(); 2];
+        for [a, b] in row {
+            along_x = [along_x[0] * x + (*a).into(), along_x[1] * x + (*b).into()];
+        }
+        sum = [sum[0] * y + along_x[0], sum[1] * y + along_x[1]];
+        if after.is_empty() {
+            break;
+        }
+        rest = after;
+        row_len += 1;
+    }
+    sum
+}
+
+/// [`evaluate`] of a cubic, written out.
+#[inline(always)]
+pub(crate) fn cubic<T: Number>(coefficients: &[[f32; 2]; 10], x: T, y: T) -> [T; 2] {
+    let [y3, y2x, y2, yx2, yx, y1, x3, x2, x1, one] = coefficients;
+    let mut sums = [x; 2];
+    for (k, sum) in sums.iter_mut().enumerate() {
+        let c = |pair: &[f32; 2]| -> T { (if k == 0 { pair[0] } else { pair[1] }).into() };
+        let of_y2 = c(y2x) * x + c(y2);
+        let of_y = (c(yx2) * x + c(yx)) * x + c(y1);
+        let of_one = ((c(x3) * x + c(x2)) * x + c(x1)) * x + c(one);
+        *sum = ((c(y3) * y + of_y2) * y + of_y) * y + of_one;
+    }
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::format::coefficient_count;
+
+    /// Powers of y and x in the order of the coefficients.
+    fn powers(degree: usize) -> impl Iterator<Item = (usize, usize)> {
+        (0..=degree)
+            .rev()
+            .flat_map(move |j| (0..=degree - j).rev().map(move |i| (j, i)))
+    }
+
+    #[test]
+    fn every_coefficient_belongs_to_its_power() {
+        let (x, y) = (0.75, -0.5);
+        for degree in 0..=9 {
+            for (k, (j, i)) in powers(degree).enumerate() {
+                let mut coefficients = [[0.0; 2]; coefficient_count(9)];
+                coefficients[k] = [1.0, -2.0];
+                let found = evaluate(&coefficients[..coefficient_count(degree)], x, y);
+                // Powers of 3/4 and 1/2 up to the ninth fit 24 binary digits.
+                let expected = x.powi(i as i32) * y.powi(j as i32);
+                assert_eq!(found, [expected, -2.0 * expected], "{degree} {j} {i}");
+            }
+        }
+        assert_eq!(evaluate(&[], x, y), [0.0; 2]);
+    }
+
+    #[test]
+    fn the_cubic_has_the_bits_of_the_general_scheme() {
+        let coefficients: [[f32; 2]; 10] =
+            core::array::from_fn(|k| [libm::sinf(k as f32 * 1.7), libm::cosf(k as f32 * 0.9)]);
+        for k in 0..100 {
+            let (x, y) = (k as f32 / 99.0, (k * 37 % 100) as f32 / 99.0);
+            let written_out = cubic(&coefficients, x, y);
+            assert_eq!(
+                written_out.map(f32::to_bits),
+                evaluate(&coefficients, x, y).map(f32::to_bits)
+            );
+        }
+    }
+
+    #[test]
+    fn derivatives_are_those_of_the_value() {
+        let coefficients: [[f32; 2]; 21] =
+            core::array::from_fn(|k| [libm::sinf(k as f32 * 1.7), libm::cosf(k as f32 * 0.9)]);
+        let (x, y) = (0.4, -0.7);
+        let at = |x: f32, y: f32| evaluate(&coefficients, x, y);
+        let dual = |value, by_u, by_v| Dual { value, by_u, by_v };
+        let found = evaluate(&coefficients, dual(x, 2.0, 0.0), dual(y, 0.0, 4.0));
+        let h = 0.015625;
+        for (k, found) in found.into_iter().enumerate() {
+            assert_eq!(found.value.to_bits(), at(x, y)[k].to_bits());
+            // Central differences of degree 5: h^2 / 6 times third derivatives of up to 60, here 2e-3.
+            let by_u = (at(x + h, y)[k] - at(x - h, y)[k]) / (2.0 * h);
+            let by_v = (at(x, y + h)[k] - at(x, y - h)[k]) / (2.0 * h);
+            assert!((found.by_u / 2.0 - by_u).abs() < 5e-3, "{k}");
+            assert!((found.by_v / 4.0 - by_v).abs() < 5e-3, "{k}");
+        }
+    }
+}
