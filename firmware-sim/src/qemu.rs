@@ -52,10 +52,10 @@ pub enum QemuError {
         /// The folder looked for.
         path: PathBuf,
     },
-    /// The image could not be built.
-    #[error("the image `{image}` could not be built ({status}): see the messages above")]
+    /// An image could not be built.
+    #[error("`{image}` could not be built ({status}): see the messages above")]
     Build {
-        /// Its name.
+        /// Its name, or their names.
         image: String,
         /// How the build ended.
         status: ExitStatus,
@@ -200,6 +200,15 @@ impl Drop for QemuDevice {
 /// # Errors
 /// [`QemuError`]; what to install if there is no toolchain is said on standard error.
 pub fn build_image(image: &str) -> Result<PathBuf, QemuError> {
+    build_images(&[image])?;
+    Ok(image_path(image))
+}
+
+/// Builds the images of these names if they are missing or stale, in one go.
+///
+/// # Errors
+/// As [`build_image`].
+pub fn build_images(images: &[&str]) -> Result<(), QemuError> {
     let root = root();
     let script = root.join("scripts/embedded-cargo.sh");
     if !script.is_file() {
@@ -208,7 +217,8 @@ pub fn build_image(image: &str) -> Result<PathBuf, QemuError> {
         });
     }
     let status = Command::new(&script)
-        .args(["build", "--quiet", "--locked", "--release", "--bin", image])
+        .args(["build", "--quiet", "--locked", "--release"])
+        .args(images.iter().flat_map(|image| ["--bin", image]))
         .stdin(Stdio::null())
         .stdout(std::io::stderr())
         .status()
@@ -218,11 +228,11 @@ pub fn build_image(image: &str) -> Result<PathBuf, QemuError> {
         })?;
     if !status.success() {
         return Err(QemuError::Build {
-            image: image.to_owned(),
+            image: images.join("`, `"),
             status,
         });
     }
-    Ok(image_path(image))
+    Ok(())
 }
 
 /// Where the image of this name is once it has been built; it may be stale.
@@ -233,7 +243,7 @@ pub fn image_path(image: &str) -> PathBuf {
 }
 
 /// The workspace's folder.
-fn root() -> &'static Path {
+pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
         .unwrap_or(Path::new("."))
@@ -245,9 +255,28 @@ fn root() -> &'static Path {
 /// # Errors
 /// [`QemuError`].
 pub fn run_to_end(image: &Path, flash_file: Option<&Path>) -> Result<Output, QemuError> {
+    run_to_end_with(image, flash_file, &[])
+}
+
+/// The same in a time of its own, in which every instruction takes 2^`time_shift` nanoseconds and
+/// nothing else takes any: a timer then counts instructions.
+///
+/// # Errors
+/// [`QemuError`].
+pub fn run_counting(image: &Path, flash_file: &Path, time_shift: u32) -> Result<Output, QemuError> {
+    let time = format!("shift={time_shift}");
+    run_to_end_with(image, Some(flash_file), &["-icount", &time])
+}
+
+fn run_to_end_with(
+    image: &Path,
+    flash_file: Option<&Path>,
+    arguments: &[&str],
+) -> Result<Output, QemuError> {
     require_qemu()?;
     let mut child = qemu_command(image, flash_file)?
         .args(["-monitor", "none", "-serial", "none"])
+        .args(arguments)
         .args(["-semihosting-config", "enable=on,target=native"])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
@@ -314,15 +343,26 @@ fn qemu_command(image: &Path, flash_file: Option<&Path>) -> Result<Command, Qemu
 /// Makes sure that QEMU is installed.
 ///
 /// # Errors
-/// [`QemuError::NotInstalled`], with the remedy in its text.
+/// As [`version`].
 pub fn require_qemu() -> Result<(), QemuError> {
-    let version = Command::new("qemu-system-arm")
+    version().map(|_| ())
+}
+
+/// What QEMU says of its version.
+///
+/// # Errors
+/// [`QemuError::NotInstalled`], with the remedy in its text.
+pub fn version() -> Result<String, QemuError> {
+    let output = Command::new("qemu-system-arm")
         .arg("--version")
-        .stdout(Stdio::null())
+        .stdin(Stdio::null())
         .stderr(Stdio::null())
-        .status();
-    match version {
-        Ok(_) => Ok(()),
+        .output();
+    match output {
+        Ok(output) => {
+            let text = String::from_utf8_lossy(&output.stdout);
+            Ok(text.lines().next().unwrap_or_default().trim().to_owned())
+        }
         Err(error) if error.kind() == ErrorKind::NotFound => Err(QemuError::NotInstalled),
         Err(source) => Err(QemuError::Io {
             what: "qemu-system-arm --version".into(),
