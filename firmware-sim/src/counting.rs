@@ -3,8 +3,9 @@
 //!
 //! The host puts a blob at the start of the flash and a [`Job`] behind it. The image runs every
 //! [`Probe`] on every match of the job and writes a [`Record`] for each run to its standard output.
-//! A new row of the table is a new [`Probe`] here and what it does in
-//! `cortex-m/src/bin/counting.rs`.
+//!
+//! A new row of the table is a new [`Probe`] here, a function that does it in
+//! `cortex-m/src/bin/counting.rs`, and a line in `WORK` of `cost/count.rs`.
 
 use ray_runtime::PixelPoint;
 
@@ -33,11 +34,11 @@ pub enum Probe {
     /// Yardstick: four channels of a bilinear table at the pixel of the first camera.
     BilinearLookup,
     /// Yardstick: two bilinear tables, and the runtime's midpoint.
-    BilinearPair,
+    BilinearTriangulate,
     /// Yardstick: the ideal image point of the pixel of the first camera by Brown's model.
     BrownUndistortion,
     /// Yardstick: two cameras of Brown's model, and the runtime's midpoint.
-    BrownPair,
+    BrownTriangulate,
 }
 
 /// What [`Probe::Known`] runs.
@@ -55,9 +56,9 @@ impl Probe {
         Self::Triangulate,
         Self::Covariance,
         Self::BilinearLookup,
-        Self::BilinearPair,
+        Self::BilinearTriangulate,
         Self::BrownUndistortion,
-        Self::BrownPair,
+        Self::BrownTriangulate,
     ];
 
     /// Whether it depends on the pixels, and is run for every match. The others are run once.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use ray_runtime::{Camera, PixelPoint, Ray, RayBlob};
 
 use super::CostError;
+use super::report::CameraCost;
 use crate::counting::{Job, PixelPair, job_start};
 use crate::qemu;
 use crate::yardstick::{BilinearTable, Brown};
@@ -35,8 +36,8 @@ pub fn built_in() -> Vec<PathBuf> {
 pub struct Asked {
     /// Its length, bytes.
     pub length: usize,
-    /// Names of the two cameras, and whether they are central.
-    pub cameras: [(String, bool); 2],
+    /// The two cameras of its matches.
+    pub cameras: [CameraCost; 2],
     /// Whether it carries the uncertainty of the two.
     pub has_uncertainty: bool,
     /// What the flash is to hold: the blob and its job.
@@ -92,10 +93,23 @@ impl Asked {
         flash.extend(job.to_bytes());
         Ok(Self {
             length: contents.len(),
-            cameras: [first, second].map(|camera| (camera.name.to_owned(), camera.is_central)),
+            cameras: [first, second].map(|camera| camera_cost(&camera)),
             has_uncertainty: uncertain.is_some(),
             flash,
         })
+    }
+}
+
+/// A camera's name and what sets it apart from others, which its rows cost what they do for.
+fn camera_cost(camera: &Camera<'_>) -> CameraCost {
+    let kind = if camera.is_central {
+        "central"
+    } else {
+        "not central"
+    };
+    CameraCost {
+        name: camera.name.to_owned(),
+        kind: kind.to_owned(),
     }
 }
 

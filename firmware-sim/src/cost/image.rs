@@ -12,9 +12,16 @@ use super::stack::{self, StackBound};
 /// Origin of what runs before and around everything.
 pub const STARTUP: &str = "startup";
 
+/// Origin of an image's own functions but `main`: in the footprint images they only call the
+/// runtime, so what they hold is the runtime's, inlined.
+pub const CALLERS: &str = "callers";
+
+/// The function that runs first and calls everything else.
+pub const RESET: &str = "Reset";
+
 /// Functions of `cortex-m-rt`, whose names are not mangled.
 const OF_STARTUP: [&str; 8] = [
-    "Reset",
+    RESET,
     "main",
     "HardFault",
     "HardFault_",
@@ -44,7 +51,8 @@ pub struct Image {
 pub struct Function {
     /// Its path, without a hash.
     pub name: String,
-    /// Crate that it comes from; `startup` for what runs before and around everything.
+    /// Crate that it comes from; `startup` for what runs before and around everything, `callers` for
+    /// the image's own.
     pub origin: String,
     /// Bytes of code.
     pub bytes: u64,
@@ -72,13 +80,14 @@ impl Image {
             what: path.display().to_string(),
             source,
         })?;
-        Self::parse(&contents).map_err(|source| CostError::Elf {
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        Self::parse(&contents, &name).map_err(|source| CostError::Elf {
             path: path.to_owned(),
             source,
         })
     }
 
-    fn parse(contents: &[u8]) -> object::Result<Self> {
+    fn parse(contents: &[u8], image: &str) -> object::Result<Self> {
         let file = object::File::parse(contents)?;
         let mut sections = BTreeMap::new();
         for section in file.sections() {
@@ -99,7 +108,7 @@ impl Image {
                     // The lowest bit says Thumb. Functions may have several names: the first stays.
                     let address = symbol.address() & !1;
                     functions.entry(address).or_insert_with(|| Function {
-                        origin: origin_of(mangled, &name),
+                        origin: origin_of(mangled, &name, image),
                         name,
                         bytes: symbol.size(),
                         address,
@@ -154,20 +163,19 @@ impl Image {
             .collect()
     }
 
-    /// Most bytes of stack that the function of this name can take, with all that it calls, below
-    /// its caller's frame. Its name is the path behind the image's own crate. `None` if there is no
-    /// such function.
-    pub fn stack_bound(&self, image: &str, name: &str) -> Option<StackBound> {
-        let path = format!("{}::{name}", image.replace('-', "_"));
-        let found = self
-            .functions
-            .iter()
-            .find(|function| function.name == path)?;
-        Some(self.code.bound(found.address))
+    /// Most bytes of stack that a function of the image's own crate can take, with all that it
+    /// calls, below its caller's frame; or [`RESET`].
+    pub fn stack_bound(&self, image: &str, function: &str) -> StackBound {
+        let path = format!("{image}::{function}");
+        let is_it = |found: &&Function| found.name == path || found.name == function;
+        match self.functions.iter().find(is_it) {
+            Some(found) => self.code.bound(found.address),
+            None => StackBound::Unknown(format!("there is no {function} in the image")),
+        }
     }
 }
 
-fn origin_of(mangled: &str, name: &str) -> String {
+fn origin_of(mangled: &str, name: &str, image: &str) -> String {
     if OF_STARTUP.contains(&mangled) || name.ends_with("::__cortex_m_rt_main") {
         return STARTUP.to_owned();
     }
@@ -178,6 +186,9 @@ fn origin_of(mangled: &str, name: &str) -> String {
     let path = name.trim_start_matches(['<', '&', '[', '(']);
     let path = path.strip_prefix("mut ").unwrap_or(path);
     let origin = path.split("::").next().unwrap_or(path);
+    if origin == image {
+        return CALLERS.to_owned();
+    }
     let is_name = |c: char| c.is_alphanumeric() || c == '_';
     if origin.chars().all(is_name) {
         origin.to_owned()

@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use super::count::TIME_SHIFT;
+use super::image::RESET;
 use super::{BlobCost, Cost, ImageCost, StackBound};
 
 /// How tables are drawn.
@@ -97,7 +99,7 @@ impl Cost {
              - a block of {} instructions counted {}; {} for the two looks at the timer and an empty call are taken off\n\n",
             conditions.qemu,
             conditions.machine,
-            super::TIME_SHIFT,
+            TIME_SHIFT,
             conditions.compiler,
             conditions.target,
             conditions.profile,
@@ -138,14 +140,10 @@ fn heading(text: &mut String, style: Style, heading: &str) {
 }
 
 fn heading_of(blob: &BlobCost) -> String {
-    let [first, second] = blob.cameras.each_ref().map(|camera| {
-        let kind = if camera.is_central {
-            "central"
-        } else {
-            "not central"
-        };
-        format!("{} ({kind})", camera.name)
-    });
+    let [first, second] = blob
+        .cameras
+        .each_ref()
+        .map(|camera| format!("{} ({})", camera.name, camera.kind));
     format!(
         "{}: {} bytes, {} matches of {first} and {second}",
         blob.blob, blob.bytes, blob.matches
@@ -153,7 +151,15 @@ fn heading_of(blob: &BlobCost) -> String {
 }
 
 fn instructions(blob: &BlobCost) -> Table {
-    let mut table = Table::new(&["instructions", "min", "mean", "max", "stack bytes", "runs"]);
+    let mut table = Table::new(&[
+        "instructions",
+        "min",
+        "mean",
+        "max",
+        "stack",
+        "at most",
+        "runs",
+    ]);
     for row in &blob.rows {
         let mut work = row.work.replace('_', " ");
         if let Some(camera) = &row.camera {
@@ -171,6 +177,7 @@ fn instructions(blob: &BlobCost) -> Table {
             format!("{:.1}", row.instructions.mean),
             row.instructions.max.to_string(),
             row.stack_bytes.to_string(),
+            bound_in_words(&row.stack_bound),
             row.runs.to_string(),
         ]);
     }
@@ -191,7 +198,7 @@ fn sizes(images: &[ImageCost]) -> Table {
     ]);
     for image in images {
         let section = |name: &str| image.sections.get(name).copied().unwrap_or(0).to_string();
-        let is_runtime_alone = !image.stack_bounds.is_empty();
+        let is_runtime_alone = !image.stack_bounds.contains_key(RESET);
         let code = if is_runtime_alone {
             image.runtime_code_bytes.to_string()
         } else {
@@ -236,13 +243,16 @@ fn bounds(images: &[ImageCost]) -> Table {
     let mut table = Table::new(&["image, function", "bytes"]);
     for image in images {
         for (function, bound) in &image.stack_bounds {
-            let bound = match bound {
-                StackBound::Bytes(bytes) => bytes.to_string(),
-                StackBound::Unknown(reason) => format!("none: {reason}"),
-            };
             let name = format!("{}, {}", image.image, function.replace('_', " "));
-            table.rows.push(vec![name, bound]);
+            table.rows.push(vec![name, bound_in_words(bound)]);
         }
     }
     table
+}
+
+fn bound_in_words(bound: &StackBound) -> String {
+    match bound {
+        StackBound::Bytes(bytes) => bytes.to_string(),
+        StackBound::Unknown(reason) => format!("none: {reason}"),
+    }
 }

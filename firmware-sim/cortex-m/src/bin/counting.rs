@@ -94,9 +94,9 @@ fn work(probe: Probe) -> Work {
         Probe::Triangulate => triangulate,
         Probe::Covariance => triangulate_with_covariance,
         Probe::BilinearLookup => bilinear_lookup,
-        Probe::BilinearPair => bilinear_pair,
+        Probe::BilinearTriangulate => bilinear_triangulate,
         Probe::BrownUndistortion => brown_undistortion,
-        Probe::BrownPair => brown_pair,
+        Probe::BrownTriangulate => brown_triangulate,
     })
 }
 
@@ -140,7 +140,7 @@ fn bilinear_lookup(task: &Task<'_>) -> bool {
     written(&task.job.tables[0].at(task.pixels[0])).is_some()
 }
 
-fn bilinear_pair(task: &Task<'_>) -> bool {
+fn bilinear_triangulate(task: &Task<'_>) -> bool {
     let [first, second] = &task.job.tables;
     let (Some(first), Some(second)) = (first.ray(task.pixels[0]), second.ray(task.pixels[1]))
     else {
@@ -154,7 +154,7 @@ fn brown_undistortion(task: &Task<'_>) -> bool {
     true
 }
 
-fn brown_pair(task: &Task<'_>) -> bool {
+fn brown_triangulate(task: &Task<'_>) -> bool {
     let [first, second] = &task.job.browns;
     let rays = (first.ray(task.pixels[0]), second.ray(task.pixels[1]));
     written(&triangulate_pair(&rays.0, &rays.1)).is_ok()
