@@ -27,7 +27,7 @@ pub use image::{Function, Static};
 pub use report::{BlobCost, CameraCost, Conditions, Cost, ImageCost, Row, SCHEMA, Spread};
 pub use stack::StackBound;
 
-/// The images whose size is reported, and the functions of each whose stack is.
+/// The images whose size is reported, what each does, and the functions of each whose stack is.
 const IMAGES: [(&str, &str, &[&str]); 3] = [
     (
         "footprint_measure",
@@ -182,15 +182,18 @@ fn image_cost(
 ) -> Result<ImageCost, CostError> {
     let image = Image::read(&qemu::image_path(name))?;
     let code_by_origin = image.code_by_origin();
+    let calls_runtime_alone = functions != [image::RESET];
+    let is_runtime = |origin: &str| origin != image::STARTUP;
     let of_runtime = code_by_origin
         .iter()
-        .filter(|(origin, _)| *origin != image::STARTUP);
+        .filter(|(origin, _)| is_runtime(origin));
+    let runtime_code_bytes = of_runtime.map(|(_, bytes)| bytes).sum();
     let bound = |function: &&'static str| (*function, image.stack_bound(name, function));
     Ok(ImageCost {
         image: name,
         does,
         ram_besides_stack: image.ram_besides_stack(),
-        runtime_code_bytes: of_runtime.map(|(_, bytes)| bytes).sum(),
+        runtime_code_bytes: calls_runtime_alone.then_some(runtime_code_bytes),
         panics: image.panics(),
         stack_bounds: functions.iter().map(bound).collect(),
         code_by_origin,

@@ -126,8 +126,8 @@ pub type PixelPair = [PixelPoint; 2];
 
 /// What a job asks, borrowed from the flash.
 ///
-/// In the flash everything is an `f32`, counts too, in the order of [`JobHead`]; then the matches,
-/// four numbers each, and the nodes of the two tables.
+/// In the flash everything is an `f32`, counts too, in the order in which
+/// [`Job::to_bytes`] writes it.
 #[derive(Debug, Clone, Copy)]
 pub struct Job<'a> {
     /// The two cameras of the matches.
@@ -175,7 +175,7 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// What stands in the flash.
+    /// What stands in the flash: head, matches, nodes of the two tables.
     #[cfg(feature = "std")]
     pub fn to_bytes(&self) -> std::vec::Vec<u8> {
         let [first, second] = self.cameras;

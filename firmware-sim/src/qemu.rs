@@ -4,6 +4,7 @@ use std::io::ErrorKind;
 use std::net::{SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
+use std::sync::mpsc;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -18,6 +19,9 @@ const FLASH_START: usize = 0x2100_0000;
 /// From the start of QEMU to the first answer of the device. It takes about a quarter of a second;
 /// the rest is for machines under load.
 const START_LIMIT: Duration = Duration::from_secs(30);
+
+/// How long an image that ends by itself may run. Checks take a second; one that crashes hangs.
+const RUN_LIMIT: Duration = Duration::from_mins(3);
 
 /// Free ports tried before giving up: between the choice of one and QEMU's use of it, somebody else
 /// may take it.
@@ -250,7 +254,7 @@ pub(crate) fn root() -> &'static Path {
 }
 
 /// Runs an image that ends by itself, such as a check, and returns what it printed over semihosting
-/// and how it ended.
+/// and how it ended. One that still runs after three minutes is killed.
 ///
 /// # Errors
 /// [`QemuError`].
@@ -286,10 +290,17 @@ fn run_to_end_with(
             what: "starting QEMU through sh".into(),
             source,
         })?;
-    // Held open until QEMU has ended: `wait_with_output` would close it at once.
+    // Held open until QEMU has ended or its time is up: its end is what ends QEMU, and
+    // `wait_with_output` would close it at once.
     let pipe = child.stdin.take();
+    let (ended, end) = mpsc::channel::<()>();
+    let watchdog = thread::spawn(move || {
+        let _ = end.recv_timeout(RUN_LIMIT);
+        drop(pipe);
+    });
     let output = child.wait_with_output();
-    drop(pipe);
+    drop(ended);
+    let _ = watchdog.join();
     output.map_err(|source| QemuError::Io {
         what: "waiting for QEMU".into(),
         source,

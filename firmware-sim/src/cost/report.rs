@@ -111,9 +111,9 @@ pub struct ImageCost {
     pub sections: BTreeMap<String, u64>,
     /// `.data`, `.bss` and `.uninit`.
     pub ram_besides_stack: u64,
-    /// Code of everything but start-up and `main`: in an image that does nothing but call the
-    /// runtime, the runtime's with all it needs.
-    pub runtime_code_bytes: u64,
+    /// Code of everything but start-up and `main`: the runtime's with all it needs, in an image that
+    /// does nothing but call the runtime. `None` for the application.
+    pub runtime_code_bytes: Option<u64>,
     /// Code by the crate it comes from.
     pub code_by_origin: BTreeMap<String, u64>,
     /// Every function.

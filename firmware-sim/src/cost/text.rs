@@ -3,7 +3,6 @@
 use std::fmt::Write;
 
 use super::count::TIME_SHIFT;
-use super::image::RESET;
 use super::{BlobCost, Cost, ImageCost, StackBound};
 
 /// How tables are drawn.
@@ -198,12 +197,9 @@ fn sizes(images: &[ImageCost]) -> Table {
     ]);
     for image in images {
         let section = |name: &str| image.sections.get(name).copied().unwrap_or(0).to_string();
-        let is_runtime_alone = !image.stack_bounds.contains_key(RESET);
-        let code = if is_runtime_alone {
-            image.runtime_code_bytes.to_string()
-        } else {
-            "-".to_owned()
-        };
+        let code = image
+            .runtime_code_bytes
+            .map_or("-".to_owned(), |bytes| bytes.to_string());
         table.rows.push(vec![
             image.does.to_owned(),
             code,
