@@ -70,9 +70,9 @@ pub enum CostError {
         /// What the runtime says.
         source: ray_runtime::OpenError,
     },
-    /// A blob has one camera.
-    #[error("{} has one camera, and a match needs two", path.display())]
-    OneCamera {
+    /// A blob has no camera.
+    #[error("{} has no camera", path.display())]
+    NoCamera {
         /// The file.
         path: PathBuf,
     },

@@ -36,8 +36,8 @@ pub fn built_in() -> Vec<PathBuf> {
 pub struct Asked {
     /// Its length, bytes.
     pub length: usize,
-    /// The two cameras of its matches.
-    pub cameras: [CameraCost; 2],
+    /// The two cameras of its matches, or the only one that there is.
+    pub cameras: Vec<CameraCost>,
     /// Whether it carries the uncertainty of the two.
     pub has_uncertainty: bool,
     /// What the flash is to hold: the blob and its job.
@@ -48,7 +48,7 @@ impl Asked {
     /// Opens a blob and chooses its matches, the same ones every time.
     ///
     /// # Errors
-    /// [`CostError`] if it is no blob of at least two cameras whose rays meet.
+    /// [`CostError`] if it is no blob, or one of two cameras whose rays never meet.
     pub fn read(path: &Path) -> Result<Self, CostError> {
         let contents = std::fs::read(path).map_err(|source| CostError::Io {
             what: path.display().to_string(),
@@ -67,9 +67,13 @@ impl Asked {
 
     fn choose(path: &Path, blob: &RayBlob<'_>, contents: &[u8]) -> Result<Self, CostError> {
         let uncertain = blob.uncertain_pairs().next();
-        let numbers = uncertain.map_or([0, 1], |pair| pair.cameras.map(usize::from));
+        let numbers = match uncertain {
+            Some(pair) => pair.cameras.map(usize::from),
+            // The only camera is asked twice, and not for points.
+            None => [0, blob.camera_count().saturating_sub(1).min(1)],
+        };
         let [Some(first), Some(second)] = numbers.map(|number| blob.camera(number)) else {
-            return Err(CostError::OneCamera {
+            return Err(CostError::NoCamera {
                 path: path.to_owned(),
             });
         };
@@ -93,7 +97,11 @@ impl Asked {
         flash.extend(job.to_bytes());
         Ok(Self {
             length: contents.len(),
-            cameras: [first, second].map(|camera| camera_cost(&camera)),
+            cameras: of_both
+                .iter()
+                .take(blob.camera_count())
+                .map(|(_, camera)| camera_cost(camera))
+                .collect(),
             has_uncertainty: uncertain.is_some(),
             flash,
         })
@@ -113,7 +121,8 @@ fn camera_cost(camera: &Camera<'_>) -> CameraCost {
     }
 }
 
-/// Pixels all over the calibrated areas of two cameras whose rays meet in front of both.
+/// Pixels all over the calibrated areas of two cameras, if they are two, whose rays meet in front of
+/// both.
 fn choose_matches(
     blob: &RayBlob<'_>,
     [first, second]: [usize; 2],
@@ -124,6 +133,9 @@ fn choose_matches(
     let meets = |[a, b]: PixelPair| {
         if !(blob.is_calibrated(first, a) && blob.is_calibrated(second, b)) {
             return false;
+        }
+        if first == second {
+            return true;
         }
         let measured = blob.triangulate_with_covariance((first, a), (second, b));
         measured.is_ok_and(|measured| measured.covariance.is_some() == has_uncertainty)

@@ -46,7 +46,15 @@ pub fn cost_of_blob(
 
     let mut rows = Vec::new();
     for work in WORK {
-        if work.probe == Probe::Covariance && !asked.has_uncertainty {
+        let is_asked = match work.probe {
+            Probe::Covariance => asked.has_uncertainty,
+            Probe::LookupSecond
+            | Probe::Triangulate
+            | Probe::BilinearTriangulate
+            | Probe::BrownTriangulate => asked.cameras.len() > 1,
+            _ => true,
+        };
+        if !is_asked {
             continue;
         }
         let answered: Vec<_> = of(work.probe)

@@ -51,8 +51,8 @@ pub struct BlobCost {
     pub blob: String,
     /// Its length.
     pub bytes: usize,
-    /// The two cameras of the matches.
-    pub cameras: [CameraCost; 2],
+    /// The two cameras of the matches, or the only one that there is.
+    pub cameras: Vec<CameraCost>,
     /// How many matches were asked.
     pub matches: usize,
     /// Instructions of the checksum by byte.

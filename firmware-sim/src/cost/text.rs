@@ -139,13 +139,17 @@ fn heading(text: &mut String, style: Style, heading: &str) {
 }
 
 fn heading_of(blob: &BlobCost) -> String {
-    let [first, second] = blob
+    let cameras: Vec<String> = blob
         .cameras
-        .each_ref()
-        .map(|camera| format!("{} ({})", camera.name, camera.kind));
+        .iter()
+        .map(|camera| format!("{} ({})", camera.name, camera.kind))
+        .collect();
     format!(
-        "{}: {} bytes, {} matches of {first} and {second}",
-        blob.blob, blob.bytes, blob.matches
+        "{}: {} bytes, {} matches of {}",
+        blob.blob,
+        blob.bytes,
+        blob.matches,
+        cameras.join(" and ")
     )
 }
 
