@@ -1,8 +1,10 @@
 //! The tables for people, plain or as Markdown.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use super::count::TIME_SHIFT;
+use super::image::STARTUP;
 use super::{BlobCost, Cost, ImageCost, StackBound};
 
 /// How tables are drawn.
@@ -125,6 +127,12 @@ impl Cost {
         heading(
             text,
             style,
+            "Functions of the runtime and what it needs, 100 bytes and more",
+        );
+        let _ = writeln!(text, "{}", functions(&self.images).drawn(style));
+        heading(
+            text,
+            style,
             "Stack by function and all it calls, upper bound, bytes",
         );
         let _ = writeln!(text, "{}", bounds(&self.images).drawn(style));
@@ -235,6 +243,43 @@ fn origins(images: &[ImageCost]) -> Table {
         let mut row = vec![origin.clone()];
         row.extend(bytes.iter().map(u64::to_string));
         table.rows.push(row);
+    }
+    table
+}
+
+/// Functions of one name, such as those of one generic, are taken together.
+fn functions(images: &[ImageCost]) -> Table {
+    let images = images
+        .iter()
+        .filter(|image| image.runtime_code_bytes.is_some());
+    let images: Vec<&ImageCost> = images.collect();
+    let mut head = vec!["function"];
+    head.extend(images.iter().map(|image| image.image));
+    let mut table = Table::new(&head);
+    let mut sizes: BTreeMap<&str, Vec<u64>> = BTreeMap::new();
+    for (column, image) in images.iter().enumerate() {
+        for function in image
+            .functions
+            .iter()
+            .filter(|function| function.origin != STARTUP)
+        {
+            let own = format!("{}::", image.image);
+            let name = function.name.strip_prefix(&own).unwrap_or(&function.name);
+            let row = sizes.entry(name).or_insert_with(|| vec![0; images.len()]);
+            if let Some(bytes) = row.get_mut(column) {
+                *bytes += function.bytes;
+            }
+        }
+    }
+    let mut sizes: Vec<_> = sizes.into_iter().collect();
+    sizes.sort_by(|(a, x), (b, y)| (y.iter().max(), a).cmp(&(x.iter().max(), b)));
+    for (name, bytes) in sizes {
+        if bytes.iter().any(|bytes| *bytes >= 100) {
+            let cells = bytes.iter().map(u64::to_string);
+            table
+                .rows
+                .push(std::iter::once(name.to_owned()).chain(cells).collect());
+        }
     }
     table
 }
