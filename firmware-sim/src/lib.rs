@@ -3,13 +3,17 @@
 
 pub mod app;
 pub mod cobs;
+pub mod counting;
 pub mod frame;
 pub mod port;
 pub mod protocol;
 pub mod session;
+pub mod yardstick;
 
 #[cfg(feature = "std")]
 pub mod client;
+#[cfg(feature = "std")]
+pub mod cost;
 #[cfg(feature = "std")]
 pub mod host;
 #[cfg(feature = "std")]

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use clap::{Parser, Subcommand};
+use firmware_sim::cost;
 use firmware_sim::host::SimulatedDevice;
 use firmware_sim::qemu::{self, QemuDevice};
 
@@ -32,6 +33,19 @@ enum Command {
         /// Run this image instead of building one.
         #[arg(long, value_name = "ELF")]
         image: Option<PathBuf>,
+    },
+    /// What the runtime costs on a Cortex-M4F: instructions counted in QEMU, stack, code. The images
+    /// are built first when they are missing or stale.
+    Cost {
+        /// Count this blob, instead of those that come with the sources.
+        #[arg(long = "blob", value_name = "FILE")]
+        blobs: Vec<PathBuf>,
+        /// One JSON object instead of tables.
+        #[arg(long)]
+        json: bool,
+        /// The document ray-runtime/COST.md instead of tables.
+        #[arg(long, conflicts_with = "json")]
+        markdown: bool,
     },
 }
 
@@ -69,6 +83,27 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
     match &arguments.command {
         Command::Host(device) => run_on_host(device),
         Command::Qemu { device, image } => run_in_qemu(device, image.as_deref()),
+        Command::Cost {
+            blobs,
+            json,
+            markdown,
+        } => {
+            let cost = if blobs.is_empty() {
+                cost::measure(&cost::built_in())?
+            } else {
+                cost::measure(blobs)?
+            };
+            let text = if *json {
+                serde_json::to_string_pretty(&cost)? + "\n"
+            } else if *markdown {
+                cost.to_markdown()
+            } else {
+                cost.to_text()
+            };
+            std::io::stdout()
+                .write_all(text.as_bytes())
+                .context("standard output")
+        }
     }
 }
 

@@ -4,6 +4,7 @@ use std::io::ErrorKind;
 use std::net::{SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
+use std::sync::mpsc;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -18,6 +19,9 @@ const FLASH_START: usize = 0x2100_0000;
 /// From the start of QEMU to the first answer of the device. It takes about a quarter of a second;
 /// the rest is for machines under load.
 const START_LIMIT: Duration = Duration::from_secs(30);
+
+/// How long an image that ends by itself may run. Checks take a second; one that crashes hangs.
+const RUN_LIMIT: Duration = Duration::from_mins(3);
 
 /// Free ports tried before giving up: between the choice of one and QEMU's use of it, somebody else
 /// may take it.
@@ -52,10 +56,10 @@ pub enum QemuError {
         /// The folder looked for.
         path: PathBuf,
     },
-    /// The image could not be built.
-    #[error("the image `{image}` could not be built ({status}): see the messages above")]
+    /// An image could not be built.
+    #[error("`{image}` could not be built ({status}): see the messages above")]
     Build {
-        /// Its name.
+        /// Its name, or their names.
         image: String,
         /// How the build ended.
         status: ExitStatus,
@@ -200,6 +204,15 @@ impl Drop for QemuDevice {
 /// # Errors
 /// [`QemuError`]; what to install if there is no toolchain is said on standard error.
 pub fn build_image(image: &str) -> Result<PathBuf, QemuError> {
+    build_images(&[image])?;
+    Ok(image_path(image))
+}
+
+/// Builds the images of these names if they are missing or stale, in one go.
+///
+/// # Errors
+/// As [`build_image`].
+pub fn build_images(images: &[&str]) -> Result<(), QemuError> {
     let root = root();
     let script = root.join("scripts/embedded-cargo.sh");
     if !script.is_file() {
@@ -208,7 +221,8 @@ pub fn build_image(image: &str) -> Result<PathBuf, QemuError> {
         });
     }
     let status = Command::new(&script)
-        .args(["build", "--quiet", "--locked", "--release", "--bin", image])
+        .args(["build", "--quiet", "--locked", "--release"])
+        .args(images.iter().flat_map(|image| ["--bin", image]))
         .stdin(Stdio::null())
         .stdout(std::io::stderr())
         .status()
@@ -218,11 +232,11 @@ pub fn build_image(image: &str) -> Result<PathBuf, QemuError> {
         })?;
     if !status.success() {
         return Err(QemuError::Build {
-            image: image.to_owned(),
+            image: images.join("`, `"),
             status,
         });
     }
-    Ok(image_path(image))
+    Ok(())
 }
 
 /// Where the image of this name is once it has been built; it may be stale.
@@ -233,21 +247,40 @@ pub fn image_path(image: &str) -> PathBuf {
 }
 
 /// The workspace's folder.
-fn root() -> &'static Path {
+pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
         .unwrap_or(Path::new("."))
 }
 
 /// Runs an image that ends by itself, such as a check, and returns what it printed over semihosting
-/// and how it ended.
+/// and how it ended. One that still runs after three minutes is killed.
 ///
 /// # Errors
 /// [`QemuError`].
 pub fn run_to_end(image: &Path, flash_file: Option<&Path>) -> Result<Output, QemuError> {
+    run_to_end_with(image, flash_file, &[])
+}
+
+/// The same in a time of its own, in which every instruction takes 2^`time_shift` nanoseconds and
+/// nothing else takes any: a timer then counts instructions.
+///
+/// # Errors
+/// [`QemuError`].
+pub fn run_counting(image: &Path, flash_file: &Path, time_shift: u32) -> Result<Output, QemuError> {
+    let time = format!("shift={time_shift}");
+    run_to_end_with(image, Some(flash_file), &["-icount", &time])
+}
+
+fn run_to_end_with(
+    image: &Path,
+    flash_file: Option<&Path>,
+    arguments: &[&str],
+) -> Result<Output, QemuError> {
     require_qemu()?;
     let mut child = qemu_command(image, flash_file)?
         .args(["-monitor", "none", "-serial", "none"])
+        .args(arguments)
         .args(["-semihosting-config", "enable=on,target=native"])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
@@ -257,10 +290,17 @@ pub fn run_to_end(image: &Path, flash_file: Option<&Path>) -> Result<Output, Qem
             what: "starting QEMU through sh".into(),
             source,
         })?;
-    // Held open until QEMU has ended: `wait_with_output` would close it at once.
+    // Held open until QEMU has ended or its time is up: its end is what ends QEMU, and
+    // `wait_with_output` would close it at once.
     let pipe = child.stdin.take();
+    let (ended, end) = mpsc::channel::<()>();
+    let watchdog = thread::spawn(move || {
+        let _ = end.recv_timeout(RUN_LIMIT);
+        drop(pipe);
+    });
     let output = child.wait_with_output();
-    drop(pipe);
+    drop(ended);
+    let _ = watchdog.join();
     output.map_err(|source| QemuError::Io {
         what: "waiting for QEMU".into(),
         source,
@@ -314,15 +354,26 @@ fn qemu_command(image: &Path, flash_file: Option<&Path>) -> Result<Command, Qemu
 /// Makes sure that QEMU is installed.
 ///
 /// # Errors
-/// [`QemuError::NotInstalled`], with the remedy in its text.
+/// As [`version`].
 pub fn require_qemu() -> Result<(), QemuError> {
-    let version = Command::new("qemu-system-arm")
+    version().map(|_| ())
+}
+
+/// What QEMU says of its version.
+///
+/// # Errors
+/// [`QemuError::NotInstalled`], with the remedy in its text.
+pub fn version() -> Result<String, QemuError> {
+    let output = Command::new("qemu-system-arm")
         .arg("--version")
-        .stdout(Stdio::null())
+        .stdin(Stdio::null())
         .stderr(Stdio::null())
-        .status();
-    match version {
-        Ok(_) => Ok(()),
+        .output();
+    match output {
+        Ok(output) => {
+            let text = String::from_utf8_lossy(&output.stdout);
+            Ok(text.lines().next().unwrap_or_default().trim().to_owned())
+        }
         Err(error) if error.kind() == ErrorKind::NotFound => Err(QemuError::NotInstalled),
         Err(source) => Err(QemuError::Io {
             what: "qemu-system-arm --version".into(),

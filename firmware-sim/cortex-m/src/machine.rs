@@ -121,6 +121,12 @@ pub fn timer_start() {
     );
 }
 
+/// Starts the timer at the full 25 MHz, to count instructions: it wraps after 171 s.
+pub fn counter_start() {
+    write(Register::TimerLoad, u32::MAX);
+    write(Register::TimerControl, TIMER_ENABLE | TIMER_32_BIT);
+}
+
 /// Ticks of the timer, counted upwards.
 pub fn timer_ticks() -> u32 {
     !read(Register::TimerValue)
@@ -143,4 +149,54 @@ pub fn refuse_to_link() -> ! {
     }
     // SAFETY: never linked, hence never called.
     unsafe { a_panic_is_reachable_in_this_image() }
+}
+
+/// A hundred instructions and no other.
+#[inline(always)]
+pub fn hundred_nops() {
+    // SAFETY: `nop` does nothing.
+    unsafe {
+        core::arch::asm!(
+            ".rept 100",
+            "nop",
+            ".endr",
+            options(nomem, nostack, preserves_flags)
+        );
+    }
+}
+
+/// Where the stack ends now.
+#[inline(always)]
+fn stack_pointer() -> usize {
+    let pointer: usize;
+    // SAFETY: reads a register.
+    unsafe {
+        core::arch::asm!("mov {}, sp", out(reg) pointer, options(nomem, nostack, preserves_flags));
+    }
+    pointer
+}
+
+/// What the stack below is painted with, and how much of it, bytes. The stack has the 4 MiB of RAM
+/// to itself but for the few bytes of statics at their other end.
+const PAINT: u32 = 0x5ca1_ab1e;
+const PAINTED_BYTES: usize = 16 << 10;
+
+/// How many bytes of stack a call writes to below the frame of its caller, from the lowest word
+/// that it changed; and what it returned. At most 16 KiB are seen.
+#[inline(never)]
+pub fn stack_bytes_of<T, R>(work: fn(&T) -> R, on: &T) -> (u32, R) {
+    let end = stack_pointer();
+    let start = end - PAINTED_BYTES;
+    for address in (start..end).step_by(4) {
+        // SAFETY: the words below the stack pointer are RAM that belongs to nobody: this
+        // function has its whole frame above, calls nothing meanwhile, and interrupts are masked.
+        unsafe { (address as *mut u32).write_volatile(PAINT) }
+    }
+    let result = work(on);
+    let mut lowest = start;
+    // SAFETY: as above; every address is painted, or was written by `work`.
+    while lowest < end && unsafe { (lowest as *const u32).read_volatile() } == PAINT {
+        lowest += 4;
+    }
+    ((end - lowest) as u32, result)
 }
