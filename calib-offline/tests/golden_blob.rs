@@ -99,11 +99,23 @@ fn golden_uncertainty(sensor: SensorSize) -> PairUncertainty {
 
 #[test]
 fn the_packer_still_writes_the_golden_blobs() {
-    still_writes("stereo-v3-small.rays", Prefer::Size);
-    still_writes("stereo-v3-fast.rays", Prefer::Speed);
+    let mixed = golden_rig();
+    // The same two cameras, both central, and both not.
+    let mut central = golden_rig();
+    central.cameras[1].field.offset = None;
+    let mut non_central = golden_rig();
+    non_central.cameras[0].field.offset = mixed.cameras[1].field.offset.clone();
+    for (rig, name) in [
+        (&mixed, "stereo"),
+        (&central, "central"),
+        (&non_central, "non-central"),
+    ] {
+        still_writes(rig, &format!("{name}-v3-small.rays"), Prefer::Size);
+        still_writes(rig, &format!("{name}-v3-fast.rays"), Prefer::Speed);
+    }
 }
 
-fn still_writes(name: &str, prefer: Prefer) {
+fn still_writes(rig: &Rig, name: &str, prefer: Prefer) {
     let path = Path::new(FOLDER).join(name);
     let settings = PackSettings {
         max_error_px: 0.002,
@@ -112,7 +124,7 @@ fn still_writes(name: &str, prefer: Prefer) {
         prefer,
         ..PackSettings::default()
     };
-    let packed = pack(&golden_rig(), &settings).unwrap();
+    let packed = pack(rig, &settings).unwrap();
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
         std::fs::write(&path, &packed.bytes).unwrap();
     }

@@ -198,7 +198,13 @@ impl<'a> RayBlob<'a> {
         a: (usize, PixelPoint),
         b: (usize, PixelPoint),
     ) -> Result<Triangulation, MeasureError> {
-        triangulate::triangulate_pair(&self.sighting(a)?, &self.sighting(b)?)
+        // By reference: a ray that is passed on as a result of its own is copied word by word.
+        let rays = (self.lookup(a.0, a.1), self.lookup(b.0, b.1));
+        match (&rays.0, &rays.1) {
+            (Ok(ray_a), Ok(ray_b)) => triangulate::triangulate_pair(ray_a, ray_b),
+            (Err(error), _) => Err(MeasureError::of_lookup(*error, a.0)),
+            (_, Err(error)) => Err(MeasureError::of_lookup(*error, b.0)),
+        }
     }
 
     /// [`RayBlob::triangulate`] with the covariance of the point, rig frame. The cameras may come in

@@ -4,8 +4,7 @@ use crate::OpenError;
 use crate::check::{check_padding, is_moderate, is_rotation, same_bits};
 use crate::error::Table;
 use crate::format::{
-    self, Axis, CameraMeta, Encoding, MAX_CELLS, MAX_DEGREE, QUANTIZED_HEADER_LEN, QuantizedHeader,
-    QuantizedMap, Record,
+    self, Axis, CameraMeta, Encoding, MAX_CELLS, MAX_DEGREE, QuantizedHeader, QuantizedMap, Record,
 };
 use crate::lookup::Views;
 
@@ -91,33 +90,44 @@ impl CameraCheck<'_> {
             .get(start >> 3..)
             .and_then(QuantizedHeader::read)
             .ok_or(self.layout(Table::Grid))?;
-        let maps = [header.direction, header.offset];
-        let is_map = |map: &QuantizedMap| map.degree <= MAX_DEGREE && map.number_len <= 2;
-        if !(maps.iter().all(is_map)
-            && (!encoding.is_central || header.offset == QuantizedMap::default()))
-        {
+        let (direction, offset) = (header.direction, header.offset);
+        let is_map = |map: QuantizedMap| map.degree <= MAX_DEGREE && map.number_len <= 2;
+        if !(is_map(direction) && is_map(offset)) {
             return Err(self.layout(Table::Grid));
         }
         let extent_px = [meta.region_width, meta.region_height];
-        let cells = self.record.cells();
-        let (expected, len) = QuantizedHeader::new(maps, encoding.is_central, extent_px, cells);
-        if header.starts != expected.starts {
-            return Err(self.layout(Table::Grid));
+        let second = (!encoding.is_central).then_some(offset);
+        let (expected, len) =
+            QuantizedHeader::new(direction, second, extent_px, self.record.cells());
+        // Starts, and of a central camera all of the offset. A step that is no number fits nothing.
+        if !(direction == expected.direction && offset == expected.offset) {
+            let is_number = !(direction.step.is_nan() || offset.step.is_nan());
+            return Err(if is_number {
+                self.layout(Table::Grid)
+            } else {
+                self.number(Table::Grid)
+            });
         }
-        let is_step = |map: &QuantizedMap| map.step >= 0.0 && is_moderate(map.step);
-        if !(header.scale == expected.scale && maps.iter().all(is_step)) {
+        let is_step = |map: QuantizedMap| map.step >= 0.0 && is_moderate(map.step);
+        if !(header.scale == expected.scale && is_step(direction) && is_step(offset)) {
             return Err(self.number(Table::Grid));
         }
-        let [_, direction_knots, offset_knots] = header.starts.map(|at| start + at as usize);
-        self.check_numbers(start + QUANTIZED_HEADER_LEN, direction_knots)?;
+        let at = |place: u32| start.saturating_add(place as usize);
+        self.check_numbers(at(direction.coefficients_start), at(direction.knots_start))?;
+        if let Some(offset) = second {
+            self.check_numbers(at(offset.coefficients_start), at(offset.knots_start))?;
+            // Between the parts of the two maps.
+            let (_, used) = QuantizedHeader::new(direction, None, extent_px, self.record.cells());
+            check_padding(
+                self.views.bytes,
+                start.saturating_add(used),
+                at(offset.coefficients_start),
+            )?;
+        }
         let end = start.saturating_add(len);
         if self.views.bytes.len() < end {
             return Err(self.layout(Table::Grid));
         }
-        // Between the knots of the two maps.
-        let knots = (cells[0] as usize + 3) * (cells[1] as usize + 3);
-        let used = direction_knots + knots * 2 * usize::from(header.direction.number_len);
-        check_padding(self.views.bytes, used, offset_knots)?;
         Ok(end)
     }
 

@@ -4,6 +4,8 @@
 
 use crate::format::Axis;
 
+// Cells are at least one (checked when a blob is opened), so that one less does not wrap.
+
 /// A place along one axis of a control grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Place {
@@ -11,6 +13,14 @@ pub(crate) struct Place {
     pub cell: usize,
     /// Weights of the knots 0, 2 and 3; knot 1 has what they leave of 1.
     pub weights: [f32; 3],
+}
+
+impl Place {
+    /// The weights of all four knots.
+    pub(crate) fn of_all(self) -> [f32; 4] {
+        let [a, c, d] = self.weights;
+        [a, 1.0 - a - c - d, c, d]
+    }
 }
 
 impl Axis {
@@ -25,7 +35,7 @@ impl Axis {
     /// The mask's cell at a coordinate that the axis contains.
     pub(crate) fn mask_cell(&self, coordinate_px: f32, mask_cells: u32) -> usize {
         let cell = ((coordinate_px - self.min_px) * self.mask_cells_per_px) as u32;
-        cell.min(mask_cells.saturating_sub(1)) as usize
+        cell.min(mask_cells.wrapping_sub(1)) as usize
     }
 
     /// The grid's cell and the weights at a coordinate that the axis contains.
@@ -46,7 +56,7 @@ impl Axis {
     /// 1, but for what `cell_high_px` leaves out of a cell's size.
     pub(crate) fn cell_and_share(&self, coordinate_px: f32, cells: u32) -> (usize, f32) {
         let x = coordinate_px - self.min_px;
-        let cell = ((x * self.cells_per_px) as u32).min(cells.saturating_sub(1));
+        let cell = ((x * self.cells_per_px) as u32).min(cells.wrapping_sub(1));
         let share = (x - cell as f32 * self.cell_high_px) * self.cells_per_px;
         (cell as usize, share)
     }
@@ -65,7 +75,7 @@ impl Axis {
     /// off by 0.0003 px.
     fn cell_and_fraction(&self, coordinate_px: f32, cells: u32) -> (usize, f32) {
         let x = coordinate_px - self.min_px;
-        let cell = ((x * self.cells_per_px) as u32).min(cells.saturating_sub(1));
+        let cell = ((x * self.cells_per_px) as u32).min(cells.wrapping_sub(1));
         let number = cell as f32;
         let rest_px = (x - number * self.cell_high_px) - number * self.cell_low_px;
         (cell as usize, rest_px * self.cells_per_px)
@@ -74,12 +84,6 @@ impl Axis {
 
 const SIXTH: f32 = 1.0 / 6.0;
 const TWO_THIRDS: f32 = 2.0 / 3.0;
-
-/// Weighted mean of four numbers, written as knot 1 plus differences to it: round-off then is
-/// that of the differences, not of the numbers.
-pub(crate) fn blend(weights: [f32; 3], knots: [f32; 4]) -> f32 {
-    knots[1] + blend_slopes(weights, knots)
-}
 
 /// What knots 0, 2 and 3 make of their differences to knot 1: with the slopes of the weights, the
 /// derivative of the mean.
@@ -135,7 +139,7 @@ mod tests {
         for u in [0.0f32, 61.35, 2999.5, 5990.125, 5999.0] {
             let place = axis.place(u, 97);
             let knot = |k: usize| (place.cell + k) as f32 - 1.0;
-            let value = blend(place.weights, [knot(0), knot(1), knot(2), knot(3)]);
+            let value = knot(1) + blend_slopes(place.weights, [knot(0), knot(1), knot(2), knot(3)]);
             let exact = (f64::from(u) + 0.5) * 97.0 / 6000.0;
             // 97 cells in f32: one digit is 8e-6 of a cell, and the fraction adds less.
             assert!(

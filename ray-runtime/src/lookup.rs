@@ -2,7 +2,7 @@
 
 use crate::format::{Encoding, Form, Record};
 use crate::polynomial::{self, Dual, Number};
-use crate::quantized::{QuantizedPart, QuantizedTable};
+use crate::quantized;
 use crate::spline::{Knots, Window};
 use crate::{LookupError, PixelPoint, Ray};
 use nalgebra::Vector3;
@@ -16,13 +16,13 @@ pub(crate) struct Views<'a> {
 
 /// Half-angle vector and scaled offset; the offset of a central camera is zero.
 #[derive(Debug, Clone, Copy)]
-struct Sample<T> {
-    s: [T; 2],
-    n: [T; 2],
+pub(crate) struct Sample<T> {
+    pub s: [T; 2],
+    pub n: [T; 2],
 }
 
 /// What a table is evaluated in: numbers, or numbers with their derivatives by the pixel.
-trait Evaluated: Number {
+pub(crate) trait Evaluated: Number {
     /// A coordinate that grows with u at a rate, 1/px.
     fn along_u(value: f32, per_px: f32) -> Self;
     /// A coordinate that grows with v at a rate, 1/px.
@@ -40,6 +40,7 @@ impl Evaluated for f32 {
         value
     }
 
+    #[inline(always)]
     fn blend(window: &Window<'_>, knots: Knots<'_>) -> Option<[Self; 2]> {
         window.blend(knots)
     }
@@ -69,6 +70,8 @@ impl Evaluated for Dual {
 
 const CENTRAL_PATCHES: u32 = number(Form::Patches, true);
 const NON_CENTRAL_PATCHES: u32 = number(Form::Patches, false);
+const CENTRAL_SPLINE: u32 = number(Form::Spline, true);
+const NON_CENTRAL_SPLINE: u32 = number(Form::Spline, false);
 
 const fn number(form: Form, is_central: bool) -> u32 {
     Encoding { form, is_central }.number()
@@ -81,18 +84,37 @@ impl Views<'_> {
         if !is_calibrated(self.bytes, record, pixel) {
             return Err(LookupError::Outside);
         }
-        let sample = match record.encoding() {
+        match record.encoding() {
             CENTRAL_PATCHES => {
                 let [s] = self.patch::<1, f32>(record, pixel)?;
-                return Ok(central_ray(record, s));
+                Ok(central_ray(record, s))
             }
             NON_CENTRAL_PATCHES => {
                 let [s, n] = self.patch::<2, f32>(record, pixel)?;
-                Sample { s, n }
+                Ok(shifted_ray(record, Sample { s, n }))
             }
-            _ => self.sample(record, pixel)?,
-        };
+            _ => self.lookup_other(record, pixel),
+        }
+    }
+
+    /// The same of other forms than patches.
+    #[inline(never)]
+    fn lookup_other(self, record: Record<'_>, pixel: PixelPoint) -> Result<Ray, LookupError> {
+        let sample = self.sample_other(record, pixel)?;
         Ok(ray(record, sample))
+    }
+
+    #[inline(always)]
+    fn sample_other<T: Evaluated>(
+        self,
+        record: Record<'_>,
+        pixel: PixelPoint,
+    ) -> Result<Sample<T>, LookupError> {
+        match record.encoding() {
+            CENTRAL_SPLINE | NON_CENTRAL_SPLINE => self.spline(record, pixel),
+            _ => quantized::sample(self, record, pixel),
+        }
+        .ok_or(LookupError::Outside)
     }
 
     /// The ray of a pixel of the region, calibrated or not, and how it moves with u and with v: of a
@@ -120,7 +142,7 @@ impl Views<'_> {
                 let [s, n] = self.patch(record, pixel)?;
                 Sample { s, n }
             }
-            _ => self.sample(record, pixel)?,
+            _ => self.sample_other(record, pixel)?,
         };
         let part = |part: fn(Dual) -> f32| Sample {
             s: sample.s.map(part),
@@ -155,54 +177,25 @@ impl Views<'_> {
         Ok(maps.each_ref().map(|map| polynomial::cubic(map, x, y)))
     }
 
-    /// The sample of a spline or a quantized table. The error cannot happen in a blob that was
-    /// opened: the sizes of its tables were checked.
+    /// The sample of a table of f32 knots. `None` cannot happen in a blob that was opened: the size of
+    /// the table was checked.
     #[inline(never)]
-    fn sample<T: Evaluated>(
-        self,
-        record: Record<'_>,
-        pixel: PixelPoint,
-    ) -> Result<Sample<T>, LookupError> {
-        let window = Window::at(record, pixel);
-        let encoding = Encoding::from_number(record.encoding()).ok_or(LookupError::Outside)?;
-        let blend = |knots: Knots<'_>| T::blend(&window, knots).ok_or(LookupError::Outside);
-        let none = [T::from(0.0); 2];
-        if encoding.form == Form::Spline {
-            let first = (record.grid_offset() >> 3) as usize;
-            let stride = encoding.channels() / 2;
-            let knots = |channels: usize| Knots::F32 {
-                pairs: self.pairs.get(first + channels..).unwrap_or_default(),
-                stride,
-            };
-            return Ok(Sample {
-                s: blend(knots(0))?,
-                n: if encoding.is_central {
-                    none
-                } else {
-                    blend(knots(1))?
-                },
-            });
-        }
-        let table = QuantizedTable::new(self, record)?;
-        let [scale_u, scale_v] = table.header.scale;
-        let x = (pixel.u - record.axis_u().min_px) * scale_u - 1.0;
-        let y = (pixel.v - record.axis_v().min_px) * scale_v - 1.0;
-        let (x, y) = (T::along_u(x, scale_u), T::along_v(y, scale_v));
-        let map = |part: QuantizedPart<'_>| -> Result<[T; 2], LookupError> {
-            let [a, b] = polynomial::evaluate(part.coefficients, x, y);
-            let Some(knots) = part.knots else {
-                return Ok([a, b]);
-            };
-            let [c, d] = blend(knots)?;
-            let step = T::from(part.step);
-            Ok([a + step * c, b + step * d])
+    fn spline<T: Evaluated>(self, record: Record<'_>, pixel: PixelPoint) -> Option<Sample<T>> {
+        let is_central = record.encoding() == CENTRAL_SPLINE;
+        let knots = |channels: usize| {
+            let first = (record.grid_offset() >> 3) as usize + channels;
+            Some(Knots::F32 {
+                pairs: self.pairs.get(first..)?,
+                stride: if is_central { 1 } else { 2 },
+            })
         };
-        Ok(Sample {
-            s: map(table.direction()?)?,
-            n: if encoding.is_central {
-                none
+        let window = Window::at(record, pixel);
+        Some(Sample {
+            s: T::blend(&window, knots(0)?)?,
+            n: if is_central {
+                [T::from(0.0); 2]
             } else {
-                map(table.offset()?)?
+                T::blend(&window, knots(1)?)?
             },
         })
     }
@@ -227,18 +220,25 @@ impl MovingRay {
 fn ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
     // Odd numbers are central.
     if record.encoding() & 1 == 1 {
-        return central_ray(record, sample.s);
-    }
-    Ray {
-        origin_mm: origin(record.rotation(), record.translation_mm(), sample),
-        direction: direction(record.rotation(), sample.s),
+        central_ray(record, sample.s)
+    } else {
+        shifted_ray(record, sample)
     }
 }
 
+#[inline(always)]
 fn central_ray(record: Record<'_>, s: [f32; 2]) -> Ray {
     Ray {
         origin_mm: record.translation_mm().into(),
         direction: direction(record.rotation(), s),
+    }
+}
+
+#[inline(always)]
+fn shifted_ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
+    Ray {
+        origin_mm: origin(record.rotation(), record.translation_mm(), sample),
+        direction: direction(record.rotation(), sample.s),
     }
 }
 

@@ -55,24 +55,35 @@ impl Mul for Dual {
     }
 }
 
-/// The polynomial whose coefficients these are; of as high a total degree as there are complete rows.
-pub(crate) fn evaluate<T: Number>(coefficients: &[[f32; 2]], x: T, y: T) -> [T; 2] {
+/// The polynomial of a total degree with these coefficients, and whatever stands behind them; `None`
+/// if there are too few.
+pub(crate) fn evaluate<T: Number>(
+    coefficients: &[[f32; 2]],
+    degree: u8,
+    x: T,
+    y: T,
+) -> Option<[T; 2]> {
+    if degree == 3 {
+        return Some(cubic(coefficients.first_chunk()?, x, y));
+    }
+    row_by_row(coefficients, degree, x, y)
+}
+
+fn row_by_row<T: Number>(coefficients: &[[f32; 2]], degree: u8, x: T, y: T) -> Option<[T; 2]> {
     let mut rest = coefficients;
     let mut sum: [T; 2] = [0.0.into(); 2];
-    let mut row_len = 1;
-    while let Some((row, after)) = rest.split_at_checked(row_len) {
-        let mut along_x: [T; 2] = [0.0.into(); 2];
-        for [a, b] in row {
-            along_x = [along_x[0] * x + (*a).into(), along_x[1] * x + (*b).into()];
+    for others in 0..=usize::from(degree) {
+        let ([a, b], after) = rest.split_first()?;
+        let (row, after) = after.split_at_checked(others)?;
+        let (mut a, mut b) = (T::from(*a), T::from(*b));
+        for [next_a, next_b] in row {
+            a = a * x + (*next_a).into();
+            b = b * x + (*next_b).into();
         }
-        sum = [sum[0] * y + along_x[0], sum[1] * y + along_x[1]];
-        if after.is_empty() {
-            break;
-        }
+        sum = [sum[0] * y + a, sum[1] * y + b];
         rest = after;
-        row_len += 1;
     }
-    sum
+    Some(sum)
 }
 
 /// [`evaluate`] of a cubic, written out.
@@ -109,13 +120,14 @@ mod tests {
             for (k, (j, i)) in powers(degree).enumerate() {
                 let mut coefficients = [[0.0; 2]; coefficient_count(9)];
                 coefficients[k] = [1.0, -2.0];
-                let found = evaluate(&coefficients[..coefficient_count(degree)], x, y);
+                let found = evaluate(&coefficients, degree as u8, x, y).unwrap();
                 // Powers of 3/4 and 1/2 up to the ninth fit 24 binary digits.
                 let expected = x.powi(i as i32) * y.powi(j as i32);
                 assert_eq!(found, [expected, -2.0 * expected], "{degree} {j} {i}");
             }
         }
-        assert_eq!(evaluate(&[], x, y), [0.0; 2]);
+        let nine = [[1.0; 2]; 9];
+        assert!(evaluate(&nine, 2, x, y).is_some() && evaluate(&nine, 3, x, y).is_none());
     }
 
     #[test]
@@ -127,7 +139,9 @@ mod tests {
             let written_out = cubic(&coefficients, x, y);
             assert_eq!(
                 written_out.map(f32::to_bits),
-                evaluate(&coefficients, x, y).map(f32::to_bits)
+                row_by_row(&coefficients, 3, x, y)
+                    .unwrap()
+                    .map(f32::to_bits)
             );
         }
     }
@@ -137,9 +151,9 @@ mod tests {
         let coefficients: [[f32; 2]; 21] =
             core::array::from_fn(|k| [libm::sinf(k as f32 * 1.7), libm::cosf(k as f32 * 0.9)]);
         let (x, y) = (0.4, -0.7);
-        let at = |x: f32, y: f32| evaluate(&coefficients, x, y);
+        let at = |x: f32, y: f32| evaluate(&coefficients, 5, x, y).unwrap();
         let dual = |value, by_u, by_v| Dual { value, by_u, by_v };
-        let found = evaluate(&coefficients, dual(x, 2.0, 0.0), dual(y, 0.0, 4.0));
+        let found = evaluate(&coefficients, 5, dual(x, 2.0, 0.0), dual(y, 0.0, 4.0)).unwrap();
         let h = 0.015625;
         for (k, found) in found.into_iter().enumerate() {
             assert_eq!(found.value.to_bits(), at(x, y)[k].to_bits());

@@ -2,7 +2,7 @@
 
 use crate::PixelPoint;
 use crate::format::Record;
-use crate::grid::{Place, blend, blend_slopes};
+use crate::grid::{Place, blend_slopes};
 use crate::polynomial::Dual;
 
 /// The knots of two channels of a camera, borrowed from the blob.
@@ -31,6 +31,7 @@ pub(crate) struct Window<'r> {
 
 impl<'r> Window<'r> {
     /// The window of a pixel in the region.
+    #[inline(always)]
     pub fn at(record: Record<'r>, pixel: PixelPoint) -> Self {
         let [cells_u, cells_v] = record.cells();
         Self {
@@ -44,30 +45,56 @@ impl<'r> Window<'r> {
 
     /// The spline at the pixel, in steps if the knots are: first along u in each of four rows, then
     /// along v. `None` if there are too few knots.
+    #[inline(always)]
     pub fn blend(&self, knots: Knots<'_>) -> Option<[f32; 2]> {
         match knots {
-            Knots::I16(pairs) => self.blend_pairs(pairs),
-            Knots::I8(pairs) => self.blend_pairs(pairs),
-            Knots::F32 { .. } => self.blend_any(knots, Weights::of(self.u), Weights::of(self.v)),
+            Knots::I16(pairs) => self.blend_steps(pairs, self.u.of_all(), self.v.of_all()),
+            Knots::I8(pairs) => self.blend_steps(pairs, self.u.of_all(), self.v.of_all()),
+            Knots::F32 { pairs, stride } => {
+                self.blend_numbers(pairs, stride, Weights::of(self.u), Weights::of(self.v))
+            }
         }
     }
 
     /// [`Window::blend`], the same bits, and its derivatives by u and v.
-    ///
-    /// It is for size, where the other is for speed.
     #[inline(never)]
     pub fn blend_moving(&self, knots: Knots<'_>) -> Option<[Dual; 2]> {
         let [cells_u, cells_v] = self.record.cells();
-        let [along_u, along_v] = [self.u, self.v].map(Weights::of);
-        let slope_u = Weights::slope(self.record.axis_u().slopes(self.pixel.u, cells_u));
-        let slope_v = Weights::slope(self.record.axis_v().slopes(self.pixel.v, cells_v));
-        let value = self.blend_any(knots, along_u, along_v)?;
-        let by_u = self.blend_any(knots, slope_u, along_v)?;
-        let by_v = self.blend_any(knots, along_u, slope_v)?;
+        let slope_u = self.record.axis_u().slopes(self.pixel.u, cells_u);
+        let slope_v = self.record.axis_v().slopes(self.pixel.v, cells_v);
+        let [value, by_u, by_v] = match knots {
+            Knots::I16(pairs) => self.steps_moving(pairs, slope_u, slope_v)?,
+            Knots::I8(pairs) => self.steps_moving(pairs, slope_u, slope_v)?,
+            Knots::F32 { pairs, stride } => {
+                let blend = |u, v| self.blend_numbers(pairs, stride, u, v);
+                let [along_u, along_v] = [self.u, self.v].map(Weights::of);
+                [
+                    blend(along_u, along_v)?,
+                    blend(Weights::slope(slope_u), along_v)?,
+                    blend(along_u, Weights::slope(slope_v))?,
+                ]
+            }
+        };
         let dual = |value, by_u, by_v| Dual { value, by_u, by_v };
         Some([
             dual(value[0], by_u[0], by_v[0]),
             dual(value[1], by_u[1], by_v[1]),
+        ])
+    }
+
+    fn steps_moving<T: Copy + Into<f32>>(
+        &self,
+        pairs: &[[T; 2]],
+        slope_u: [f32; 3],
+        slope_v: [f32; 3],
+    ) -> Option<[[f32; 2]; 3]> {
+        let (along_u, along_v) = (self.u.of_all(), self.v.of_all());
+        // The slopes of all four weights cancel.
+        let of_all = |[a, c, d]: [f32; 3]| [a, -a - c - d, c, d];
+        Some([
+            self.blend_steps(pairs, along_u, along_v)?,
+            self.blend_steps(pairs, of_all(slope_u), along_v)?,
+            self.blend_steps(pairs, along_u, of_all(slope_v))?,
         ])
     }
 
@@ -76,32 +103,51 @@ impl<'r> Window<'r> {
         (self.v.cell + j) * self.knots_u + self.u.cell
     }
 
-    fn blend_pairs<T: Copy + Into<f32>>(&self, pairs: &[[T; 2]]) -> Option<[f32; 2]> {
-        let row = |j: usize| -> Option<[f32; 2]> {
-            let [a, b, c, d] = pairs.get(self.start(j)..)?.first_chunk::<4>()?;
-            let along_u = |knots: [T; 4]| blend(self.u.weights, knots.map(<T as Into<f32>>::into));
-            Some([
-                along_u([a[0], b[0], c[0], d[0]]),
-                along_u([a[1], b[1], c[1], d[1]]),
-            ])
-        };
-        let (a, b, c, d) = (row(0)?, row(1)?, row(2)?, row(3)?);
-        let along_v = |knots| blend(self.v.weights, knots);
-        Some([
-            along_v([a[0], b[0], c[0], d[0]]),
-            along_v([a[1], b[1], c[1], d[1]]),
-        ])
+    /// Integers are exact in f32 and what they add to is small: each counts with its own weight.
+    #[inline(never)]
+    fn blend_steps<T: Copy + Into<f32>>(
+        &self,
+        pairs: &[[T; 2]],
+        along_u: [f32; 4],
+        along_v: [f32; 4],
+    ) -> Option<[f32; 2]> {
+        let mut sum = [0.0; 2];
+        let mut rest = pairs.get(self.start(0)..)?;
+        for (j, weight) in along_v.into_iter().enumerate() {
+            if j > 0 {
+                rest = rest.get(self.knots_u..)?;
+            }
+            let [a, b, c, d] = rest.first_chunk::<4>()?;
+            for (channel, sum) in sum.iter_mut().enumerate() {
+                let at =
+                    |pair: &[T; 2]| -> f32 { if channel == 0 { pair[0] } else { pair[1] }.into() };
+                let row = along_u[0] * at(a)
+                    + along_u[1] * at(b)
+                    + along_u[2] * at(c)
+                    + along_u[3] * at(d);
+                *sum += weight * row;
+            }
+        }
+        Some(sum)
     }
 
+    /// Numbers of full size are blended as one of them and differences to it, whose round-off is
+    /// smaller.
     #[inline(never)]
-    fn blend_any(&self, knots: Knots<'_>, along_u: Weights, along_v: Weights) -> Option<[f32; 2]> {
+    fn blend_numbers(
+        &self,
+        pairs: &[[f32; 2]],
+        stride: usize,
+        along_u: Weights,
+        along_v: Weights,
+    ) -> Option<[f32; 2]> {
         let mut rows = [[0.0; 4]; 2];
         for j in 0..4 {
             let mut row = [[0.0; 4]; 2];
             for i in 0..4 {
-                let pair = knots.get(self.start(j) + i)?;
+                let pair = pairs.get((self.start(j) + i) * stride)?;
                 for (channel, value) in row.iter_mut().zip(pair) {
-                    *channel.get_mut(i)? = value;
+                    *channel.get_mut(i)? = *value;
                 }
             }
             for (channel, knots) in rows.iter_mut().zip(row) {
@@ -109,16 +155,6 @@ impl<'r> Window<'r> {
             }
         }
         Some(rows.map(|knots| along_v.applied_to(knots)))
-    }
-}
-
-impl Knots<'_> {
-    fn get(&self, number: usize) -> Option<[f32; 2]> {
-        match *self {
-            Self::F32 { pairs, stride } => pairs.get(number * stride).copied(),
-            Self::I16(pairs) => pairs.get(number).map(|pair| pair.map(f32::from)),
-            Self::I8(pairs) => pairs.get(number).map(|pair| pair.map(f32::from)),
-        }
     }
 }
 
@@ -146,6 +182,7 @@ impl Weights {
     }
 
     fn applied_to(self, knots: [f32; 4]) -> f32 {
-        self.of_knot_1 * knots[1] + blend_slopes(self.of_differences, knots)
+        let [_, b, ..] = knots;
+        self.of_knot_1 * b + blend_slopes(self.of_differences, knots)
     }
 }

@@ -86,6 +86,7 @@ impl Meeting {
 }
 
 /// Where two rays meet.
+#[inline(always)]
 pub(crate) fn meet(a: &Ray, b: &Ray) -> Result<Meeting, MeasureError> {
     let (d1, d2) = (a.direction, b.direction);
     let w = b.origin_mm - a.origin_mm;

@@ -6,7 +6,7 @@ use super::residual_spline::{Knots, ResidualSpline};
 use super::table::{Table, Target};
 use crate::field::CalibratedCamera;
 use crate::geometry::PixelPoint;
-use ray_runtime::format::{self, Encoding, Form, MAX_DEGREE, QuantizedHeader, QuantizedMap};
+use ray_runtime::format::{Encoding, Form, MAX_DEGREE, QuantizedHeader, QuantizedMap};
 
 /// Bytes of a knot's number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -130,25 +130,12 @@ impl<'a> Predictors<'a> {
         cells: [u32; 2],
     ) -> (QuantizedHeader, usize) {
         let sensor = self.camera.field.sensor;
-        let direction = QuantizedMap {
-            degree,
-            number_len: number.len(),
-            step: step as f32,
-        };
-        let offset = match &self.offset {
-            None => QuantizedMap::default(),
-            Some(offset) => QuantizedMap {
-                degree: offset.degree as u8,
-                number_len: self.offset_number(number).len(),
-                step: offset_step as f32,
-            },
-        };
-        QuantizedHeader::new(
-            [direction, offset],
-            self.offset.is_none(),
-            [sensor.width, sensor.height],
-            cells,
-        )
+        let direction = QuantizedMap::new(degree, number.len(), step as f32);
+        let offset = self.offset.as_ref().map(|offset| {
+            let number = self.offset_number(number);
+            QuantizedMap::new(offset.degree as u8, number.len(), offset_step as f32)
+        });
+        QuantizedHeader::new(direction, offset, [sensor.width, sensor.height], cells)
     }
 
     /// The knots of the offset, beside those of the direction.
@@ -200,17 +187,20 @@ impl<'a> Predictors<'a> {
         let (header, len) = self.header(degree, number, steps, cells);
 
         let mut bytes = header.to_bytes().to_vec();
-        push_coefficients(&mut bytes, &direction, [0, 1]);
-        push_coefficients(&mut bytes, &offset, [2, 3]);
-        if let Some(knots) = &knots {
-            push_knots(&mut bytes, knots, [0, 1], header.direction);
-            if offset_number != Number::None {
-                bytes.resize(format::aligned(bytes.len()), 0);
-                push_knots(&mut bytes, knots, [2, 3], header.offset);
+        for (coefficients, channels, map) in [
+            (&direction, [0, 1], header.direction),
+            (&offset, [2, 3], header.offset),
+        ] {
+            if coefficients.is_empty() {
+                continue;
+            }
+            bytes.resize(map.coefficients_start as usize, 0);
+            push_coefficients(&mut bytes, coefficients, channels);
+            if let Some(knots) = knots.as_ref().filter(|_| map.number_len > 0) {
+                push_knots(&mut bytes, knots, channels, map);
             }
         }
-        // Where there are no knots of the offset, the padding in front of them counts.
-        bytes.resize(len, 0);
+        debug_assert_eq!(bytes.len(), len);
         Ok(Table {
             encoding: Encoding {
                 form: Form::Quantized,

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use ray_runtime::format::Form;
 use ray_runtime::{Camera, PixelPoint, Ray, RayBlob};
 
 use super::CostError;
@@ -12,7 +13,13 @@ use crate::yardstick::{BilinearTable, Brown};
 
 /// The blobs that are counted if none are given, from the workspace's folder: one a line for every
 /// encoding.
-const BUILT_IN: &[&str] = &["data/golden/stereo-v1.rays", "data/golden/stereo-v2.rays"];
+const BUILT_IN: &[&str] = &[
+    "data/golden/central-v3-fast.rays",
+    "data/golden/non-central-v3-fast.rays",
+    "data/golden/central-v3-small.rays",
+    "data/golden/non-central-v3-small.rays",
+    "data/golden/stereo-v2.rays",
+];
 
 /// Matches on each blob.
 pub const MATCH_COUNT: usize = 64;
@@ -110,14 +117,19 @@ impl Asked {
 
 /// A camera's name and what sets it apart from others, which its rows cost what they do for.
 fn camera_cost(camera: &Camera<'_>) -> CameraCost {
-    let kind = if camera.is_central {
+    let form = match camera.encoding.form {
+        Form::Spline => "f32 spline",
+        Form::Patches => "f32 patches",
+        Form::Quantized => "polynomial and quantized knots",
+    };
+    let kind = if camera.encoding.is_central {
         "central"
     } else {
         "not central"
     };
     CameraCost {
         name: camera.name.to_owned(),
-        kind: kind.to_owned(),
+        kind: format!("{form}, {kind}"),
     }
 }
 

@@ -3,11 +3,12 @@
 use super::{aligned, coefficient_count};
 
 /// Bytes of a [`QuantizedHeader`].
-pub const QUANTIZED_HEADER_LEN: usize = 4 * WORDS;
+pub const QUANTIZED_HEADER_LEN: usize = 8 * PAIRS;
 /// Largest total degree of a predictor.
 pub const MAX_DEGREE: u8 = 9;
 
-const WORDS: usize = 8;
+/// Words of 4 bytes, in pairs.
+const PAIRS: usize = 5;
 
 /// One of the two maps of a quantized table: the half-angle vector, or the scaled offset.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -18,6 +19,10 @@ pub struct QuantizedMap {
     pub number_len: u8,
     /// What a knot's number counts.
     pub step: f32,
+    /// Where the coefficients start, bytes from the start of the table.
+    pub coefficients_start: u32,
+    /// Where the knots start, or would, bytes from the start of the table.
+    pub knots_start: u32,
 }
 
 /// What stands in front of the coefficients and knots of a quantized table.
@@ -29,78 +34,96 @@ pub struct QuantizedHeader {
     pub offset: QuantizedMap,
     /// `2 / extent` of the region along u and v: the polynomials' variables run from -1 to 1.
     pub scale: [f32; 2],
-    /// Where the polynomial of the offset and the knots of both maps start, bytes from the start of
-    /// the table; the polynomial of the direction stands behind the header.
-    pub starts: [u32; 3],
+}
+
+impl QuantizedMap {
+    /// A map of which nothing is placed yet.
+    pub const fn new(degree: u8, number_len: u8, step: f32) -> Self {
+        Self {
+            degree,
+            number_len,
+            step,
+            coefficients_start: 0,
+            knots_start: 0,
+        }
+    }
+
+    /// The map in two pairs of words; `None` if the first word has bits that mean nothing.
+    pub fn read([[kind, step], [coefficients, knots]]: [[f32; 2]; 2]) -> Option<Self> {
+        let [degree, number_len, 0, 0] = kind.to_bits().to_le_bytes() else {
+            return None;
+        };
+        Some(Self {
+            degree,
+            number_len,
+            step,
+            coefficients_start: coefficients.to_bits(),
+            knots_start: knots.to_bits(),
+        })
+    }
+
+    fn to_words(self) -> [u32; 4] {
+        [
+            u32::from_le_bytes([self.degree, self.number_len, 0, 0]),
+            self.step.to_bits(),
+            self.coefficients_start,
+            self.knots_start,
+        ]
+    }
+
+    /// The map with its parts behind `start`; where they end.
+    const fn placed(self, start: usize, cells: [u32; 2]) -> (Self, usize) {
+        let knots = (cells[0] as usize + 3) * (cells[1] as usize + 3);
+        let knots_start = start + coefficient_count(self.degree as usize) * 8;
+        let placed = Self {
+            coefficients_start: start as u32,
+            knots_start: knots_start as u32,
+            ..self
+        };
+        (placed, knots_start + knots * 2 * self.number_len as usize)
+    }
 }
 
 impl QuantizedHeader {
-    /// The header of these maps over a grid of `cells`, and the length of its table without the
-    /// padding behind it.
+    /// The header of these maps, wherever they were placed, over a grid of `cells`, and the length of
+    /// its table without the padding behind it. A central camera has no second map.
     pub const fn new(
-        [direction, offset]: [QuantizedMap; 2],
-        is_central: bool,
+        direction: QuantizedMap,
+        offset: Option<QuantizedMap>,
         extent_px: [u32; 2],
         cells: [u32; 2],
     ) -> (Self, usize) {
-        let direction_len = coefficient_count(direction.degree as usize) * 8;
-        let offset_len = if is_central {
-            0
-        } else {
-            coefficient_count(offset.degree as usize) * 8
+        let (direction, direction_end) = direction.placed(QUANTIZED_HEADER_LEN, cells);
+        let (offset, end) = match offset {
+            Some(offset) => offset.placed(aligned(direction_end), cells),
+            None => (QuantizedMap::new(0, 0, 0.0), direction_end),
         };
-        let knots = (cells[0] as usize + 3) * (cells[1] as usize + 3);
-        let offset_start = QUANTIZED_HEADER_LEN + direction_len;
-        let direction_knots = offset_start + offset_len;
-        let offset_knots = aligned(direction_knots + knots * 2 * direction.number_len as usize);
         let header = Self {
             direction,
             offset,
             scale: [2.0 / extent_px[0] as f32, 2.0 / extent_px[1] as f32],
-            starts: [
-                offset_start as u32,
-                direction_knots as u32,
-                offset_knots as u32,
-            ],
         };
-        (
-            header,
-            offset_knots + knots * 2 * offset.number_len as usize,
-        )
+        (header, end)
     }
 
-    /// The header at the start of a table. Nothing is judged. `None` if there are too few bytes.
+    /// The header at the start of a table. Nothing is judged but bits that mean nothing. `None` if there
+    /// are too few bytes.
     pub fn read(pairs: &[[f32; 2]]) -> Option<Self> {
-        let [a, b, c, d] = pairs.first_chunk::<{ WORDS / 2 }>()?;
-        let [direction_degree, direction_len, offset_degree, offset_len] = a[0].to_le_bytes();
+        let [a, b, c, d, scale] = pairs.first_chunk::<PAIRS>()?;
         Some(Self {
-            direction: QuantizedMap {
-                degree: direction_degree,
-                number_len: direction_len,
-                step: a[1],
-            },
-            offset: QuantizedMap {
-                degree: offset_degree,
-                number_len: offset_len,
-                step: b[0],
-            },
-            scale: [b[1], c[0]],
-            starts: [c[1].to_bits(), d[0].to_bits(), d[1].to_bits()],
+            direction: QuantizedMap::read([*a, *b])?,
+            offset: QuantizedMap::read([*c, *d])?,
+            scale: *scale,
         })
     }
 
     /// The header's bytes.
     pub fn to_bytes(self) -> [u8; QUANTIZED_HEADER_LEN] {
-        let maps = [self.direction, self.offset];
-        let [direction, offset] = maps.map(|map| [map.degree, map.number_len]);
-        let kinds = [direction[0], direction[1], offset[0], offset[1]];
-        let numbers = [maps[0].step, maps[1].step, self.scale[0], self.scale[1]];
         let mut bytes = [0; QUANTIZED_HEADER_LEN];
-        let all = kinds
-            .into_iter()
-            .chain(numbers.into_iter().flat_map(f32::to_le_bytes))
-            .chain(self.starts.into_iter().flat_map(u32::to_le_bytes));
-        for (place, byte) in bytes.iter_mut().zip(all) {
+        let words = [self.direction.to_words(), self.offset.to_words()];
+        let scale = self.scale.map(f32::to_bits);
+        let all = words.as_flattened().iter().chain(&scale);
+        for (place, byte) in bytes.iter_mut().zip(all.flat_map(|w| w.to_le_bytes())) {
             *place = byte;
         }
         bytes
@@ -109,36 +132,40 @@ impl QuantizedHeader {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
     use super::*;
+    use std::vec::Vec;
 
     #[test]
     fn bytes_are_where_the_format_says() {
-        let map = |degree, number_len, step| QuantizedMap {
-            degree,
-            number_len,
-            step,
-        };
-        let maps = [map(5, 2, 0.001), map(3, 1, 0.5)];
-        let (header, len) = QuantizedHeader::new(maps, false, [64, 48], [3, 2]);
-        // 21 coefficients and 10 of two f32; 6 x 5 knots of two i16 and of two i8.
-        assert_eq!(header.starts, [32 + 168, 32 + 248, 32 + 248 + 120]);
-        assert_eq!(len, 400 + 60);
+        let direction = QuantizedMap::new(5, 2, 0.001);
+        let offset = QuantizedMap::new(3, 1, 0.5);
+        let (header, len) = QuantizedHeader::new(direction, Some(offset), [64, 48], [3, 2]);
+        // 21 coefficients of two f32 and 6 x 5 knots of two i16; 10, and knots of two i8.
+        assert_eq!(header.direction.coefficients_start, 40);
+        assert_eq!(header.direction.knots_start, 40 + 168);
+        assert_eq!(header.offset.coefficients_start, 208 + 120);
+        assert_eq!(header.offset.knots_start, 328 + 80);
+        assert_eq!(len, 408 + 60);
         let bytes = header.to_bytes();
-        assert_eq!(bytes[..4], [5, 2, 3, 1]);
+        assert_eq!(bytes[..4], [5, 2, 0, 0]);
         assert_eq!(bytes[4..8], 0.001f32.to_le_bytes());
-        assert_eq!(bytes[12..16], (1.0f32 / 32.0).to_le_bytes());
-        assert_eq!(bytes[24..28], 280u32.to_le_bytes());
+        assert_eq!(bytes[12..16], 208u32.to_le_bytes());
+        assert_eq!(bytes[16..20], [3, 1, 0, 0]);
+        assert_eq!(bytes[32..36], (1.0f32 / 32.0).to_le_bytes());
 
-        let pairs: [[f32; 2]; 4] = bytemuck::cast(bytes);
+        let mut pairs: Vec<[f32; 2]> = bytes
+            .chunks(8)
+            .map(|pair| [0, 4].map(|k| f32::from_le_bytes(pair[k..k + 4].try_into().unwrap())))
+            .collect();
         assert_eq!(QuantizedHeader::read(&pairs), Some(header));
         assert_eq!(QuantizedHeader::read(&pairs[1..]), None);
+        pairs[2][0] = f32::from_bits(0x0001_0103);
+        assert_eq!(QuantizedHeader::read(&pairs), None);
 
-        let (central, len) = QuantizedHeader::new(
-            [map(7, 0, 0.0), QuantizedMap::default()],
-            true,
-            [64, 48],
-            [1, 1],
-        );
-        assert_eq!((len, central.starts), (32 + 288, [320; 3]));
+        let (central, len) =
+            QuantizedHeader::new(QuantizedMap::new(7, 0, 0.0), None, [64, 48], [1, 1]);
+        assert_eq!((len, central.offset), (40 + 288, QuantizedMap::default()));
     }
 }

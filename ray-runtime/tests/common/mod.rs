@@ -160,29 +160,16 @@ impl TestCamera {
             }
             // The polynomial has the slope along u and the middle; the knots that along v.
             Form::Quantized => {
-                let map = |degree, number_len, step| QuantizedMap {
-                    degree,
-                    number_len,
-                    step,
-                };
                 let is_central = self.encoding.is_central;
-                let direction = map(1, 2, 1.0 / 512.0 / self.focal_px);
-                let offset = if is_central {
-                    QuantizedMap::default()
-                } else {
-                    map(0, 1, 0.25)
-                };
+                let direction = QuantizedMap::new(1, 2, 1.0 / 512.0 / self.focal_px);
+                let offset = (!is_central).then_some(QuantizedMap::new(0, 1, 0.25));
                 let extent = [self.region[2], self.region[3]];
-                let (header, len) =
-                    QuantizedHeader::new([direction, offset], is_central, extent, self.cells);
+                let (header, len) = QuantizedHeader::new(direction, offset, extent, self.cells);
                 bytes.extend(header.to_bytes());
                 let middle = [0, 1].map(|axis| self.edge(axis, self.cells[axis] as f32 / 2.0));
                 let [s1, s2] = self.s(middle[0], middle[1]);
                 let slope_u = extent[0] as f32 / 2.0 / self.focal_px;
                 bytes.extend(f32_bytes(vec![0.0, 0.0, slope_u, 0.0, s1, s2]));
-                if !is_central {
-                    bytes.extend(f32_bytes(vec![self.offset_mm[0], self.offset_mm[1] - 1.0]));
-                }
                 for j in 0..cells_v + 3 {
                     let v = self.edge(1, j as f32 - 1.0) - middle[1];
                     let knot = [0, (512.0 * v).round() as i16];
@@ -190,7 +177,8 @@ impl TestCamera {
                     bytes.extend(row.repeat(cells_u as usize + 3));
                 }
                 if !is_central {
-                    bytes.resize(header.starts[2] as usize, 0);
+                    bytes.resize(header.offset.coefficients_start as usize, 0);
+                    bytes.extend(f32_bytes(vec![self.offset_mm[0], self.offset_mm[1] - 1.0]));
                     bytes.extend([0, 4].repeat(((cells_u + 3) * (cells_v + 3)) as usize));
                 }
                 bytes.resize(len, 0);
