@@ -176,3 +176,22 @@ fn boards_in_one_depth_support_no_ray() {
     let error = estimate(&start, &|_| None, &AlternatingSettings::default()).unwrap_err();
     assert_eq!(error, AlternatingError::FewBoards);
 }
+
+#[test]
+fn a_start_that_does_not_exist_is_not_blamed_on_the_boards() {
+    let scene = scene(OpticsKind::Brown, |_| ());
+    let observations = observations(&scene, &scene.observe_corners());
+    let mut start = start_rig(&observations).unwrap();
+    // One view makes no pinhole of the second camera; the start still has its place.
+    let views = &mut start.observations.views;
+    views.retain(|view| view.camera_idx == 0 || view.pose_idx == 0);
+    let wanted = AlternatingSettings {
+        start: Some(StartKind::PinholeRig),
+        ..AlternatingSettings::default()
+    };
+    let found = estimate(&start, &|_| None, &wanted).map(|found| found.starts);
+    assert_eq!(found, Err(AlternatingError::NoStart));
+    let any = AlternatingSettings::default();
+    let found = estimate(&start, &|_| None, &any).map(|found| found.starts.len());
+    assert_eq!(found, Ok(1));
+}

@@ -14,6 +14,9 @@ use serde::{Deserialize, Serialize};
 
 /// One corner in so many is left out.
 const FOLDS: usize = 5;
+/// Fewest corners of a view whose network can be tested: without a fold of them [`MIN_CORNERS`] are
+/// left.
+pub const MIN_TESTED_CORNERS: usize = (MIN_CORNERS * FOLDS).div_ceil(FOLDS - 1);
 /// Candidates of [`choose`]: spreads as shares of the median distance of a corner from the middle of
 /// its board's image, from neighbors to the flat limit.
 const SHARES: [f64; 17] = [
@@ -106,7 +109,7 @@ struct PreparedView {
 impl PreparedView {
     fn new(corners: &[ObservedCorner], settings: &NetworkSettings) -> Option<Self> {
         // Folds must train as well.
-        if corners.len() * (FOLDS - 1) / FOLDS < MIN_CORNERS {
+        if corners.len() < MIN_TESTED_CORNERS {
             return None;
         }
         let is_inner = |corner: &ObservedCorner| {
