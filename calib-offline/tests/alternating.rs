@@ -170,9 +170,7 @@ fn boards_in_one_depth_support_no_ray() {
         settings.angles_deg = vec![-1.0, -0.5, 0.0, 0.5, 1.0];
     });
     let observations = observations(&scene, &scene.observe_corners());
-    let Ok(start) = start_rig(&observations) else {
-        return;
-    };
+    let start = start_rig(&observations).unwrap();
     let error = estimate(&start, &|_| None, &AlternatingSettings::default()).unwrap_err();
     assert_eq!(error, AlternatingError::FewBoards);
 }
