@@ -1,7 +1,7 @@
 //! The published procedure as a method of the pipeline.
 
 use super::Method;
-use super::solution::{Solution, Solved, Task, folds_wanted};
+use super::solution::{FoldError, Solution, Solved, Task, folds_wanted};
 use crate::adjust::Observations;
 use crate::adjust::robust::{relative_weights, reweight};
 use crate::alternating::alternation::{Alternated, AlternationStop};
@@ -13,21 +13,9 @@ use crate::evaluate::estimate_folds;
 use crate::evaluate::held_out::Estimated;
 use crate::evaluate::reprojection::residuals;
 use crate::field::BaseLens;
-use crate::init::InitError;
 use crate::init::rig::{RigStart, start_rig};
 use crate::progress::Progress;
 use crate::report::record::AlternatingRecord;
-
-/// Why some training poses gave no estimate.
-#[derive(Debug, thiserror::Error)]
-pub enum FoldError {
-    /// No start.
-    #[error(transparent)]
-    Start(#[from] InitError),
-    /// No estimate.
-    #[error(transparent)]
-    Estimate(#[from] AlternatingError),
-}
 
 /// Screens, runs the published procedure, and checks it without the poses of each fold.
 ///
@@ -92,9 +80,10 @@ pub fn alternating_solution(
 pub fn estimate_alternating(
     training: &Observations,
     placement: &dyn Fn(usize) -> Option<usize>,
-) -> Result<Estimated, FoldError> {
+) -> Result<Estimated, FoldError<AlternatingError>> {
     let start = start_rig(training)?;
-    let (_, fields) = estimate_rig(&start, &training.numbered_cameras(), placement)?;
+    let names = training.numbered_cameras();
+    let (_, fields) = estimate_rig(&start, &names, placement).map_err(FoldError::Estimate)?;
     Ok(Estimated {
         rig: fields.rig,
         board_shape: BoardShape::default(),

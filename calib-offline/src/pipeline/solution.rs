@@ -8,6 +8,7 @@ use crate::dataset::sufficiency::MIN_POSES;
 use crate::evaluate::{CrossChecks, Folds};
 use crate::field::Rig;
 use crate::geometry::RigidTransform;
+use crate::init::InitError;
 use crate::init::screening::Finding;
 use crate::report::record::{AlternatingRecord, ChoicesRecord};
 use nalgebra::Vector2;
@@ -84,6 +85,17 @@ pub struct Solved {
     pub solution: Solution,
     /// For the check on unseen boards.
     pub folds: Folds,
+}
+
+/// Why some training poses gave no estimate; `E` is the method's own error.
+#[derive(Debug, thiserror::Error)]
+pub enum FoldError<E> {
+    /// No start.
+    #[error(transparent)]
+    Start(#[from] InitError),
+    /// No estimate.
+    #[error(transparent)]
+    Estimate(E),
 }
 
 /// So many folds, or none with too few poses to leave some out.
