@@ -14,6 +14,9 @@ use calib_offline::alternating::{
 use calib_offline::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
 use calib_offline::geometry::{Ray, RigidTransform, triangulate_rays};
 use calib_offline::init::rig::start_rig;
+use calib_offline::pipeline::alternatingly::alternating_solution;
+use calib_offline::pipeline::solution::Task;
+use calib_offline::progress::Silent;
 use calib_offline::simulate::{MatchSet, OpticsKind, Scene};
 
 fn run(scene: &Scene, settings: &AlternatingSettings) -> AlternatingEstimate {
@@ -192,4 +195,30 @@ fn a_start_that_does_not_exist_is_not_blamed_on_the_boards() {
     let any = AlternatingSettings::default();
     let found = estimate(&start, &|_| None, &any).map(|found| found.starts.len());
     assert_eq!(found, Ok(1));
+}
+
+#[test]
+fn corners_outside_the_calibrated_area_are_no_outliers() {
+    // With little noise, what a field says beyond its rays lies far beyond the noise.
+    let scene = scene(OpticsKind::Brown, |settings| settings.noise_px = 0.002);
+    let task = Task {
+        names: &["left".to_owned(), "right".to_owned()],
+        folds: 0,
+        placement: &|pose| Some(scene.pose_placements[pose]),
+    };
+    let offered = observations(&scene, &scene.observe_corners());
+    let found = alternating_solution(&offered, &task, &Silent)
+        .unwrap()
+        .solution;
+    let mut outside = 0;
+    for (view, residuals) in found.observations.views.iter().zip(&found.residuals) {
+        let coverage = &found.rig.cameras[view.camera_idx].coverage;
+        for (corner, residual) in view.corners.iter().zip(residuals) {
+            assert_eq!(residual.is_some(), coverage.contains(corner.pixel));
+            outside += usize::from(residual.is_none());
+        }
+    }
+    assert!(outside > 0);
+    // Gaussian noise goes beyond 8 standard deviations once in 10^14 corners.
+    assert_eq!(found.rejected_count(), 0);
 }

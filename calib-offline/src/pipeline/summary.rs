@@ -108,7 +108,7 @@ fn corner_records(solution: &Solution) -> Vec<CornerRecord> {
                 row: corner.row,
                 col: corner.col,
                 observed: corner.pixel,
-                // A corner behind its camera has weight 0 and no residual to speak of.
+                // A corner that no ray predicts has weight 0 and no residual to speak of.
                 residual_px: residual.unwrap_or_else(Vector2::zeros),
                 weight: *weight,
             });
@@ -129,7 +129,7 @@ fn estimate_record(solution: &Solution, corners: &[CornerRecord]) -> EstimateRec
         sigma_px: solution.sigma_px,
         rms_px: rms(&used).unwrap_or(0.0),
         corners_used: used.len(),
-        corners_rejected: corners.len() - used.len(),
+        corners_rejected: solution.rejected_count(),
     }
 }
 
