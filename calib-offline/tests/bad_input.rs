@@ -680,6 +680,14 @@ fn evaluations_that_cannot_be() {
             .assert_says(parts);
         assert_eq!(contents(home.path()), before, "{arguments:?}");
     }
+    let manifest = home.path().join("set/dataset.toml");
+    let excluding = format!("[dataset]\nexclude = [6]\n{MANIFEST}");
+    std::fs::write(&manifest, excluding).unwrap();
+    run(home.path(), &["evaluate", "set"])
+        .assert_code(2)
+        .assert_says(&["no pose 6", "the last is pose 5", "try: "]);
+    assert!(!home.path().join("evaluation").exists());
+    std::fs::write(&manifest, MANIFEST).unwrap();
     let truth = home.path().join("set/truth.json");
     for (content, part) in [("{", "EOF"), ("{\"settings\": {}}", "missing field")] {
         std::fs::write(&truth, content).unwrap();

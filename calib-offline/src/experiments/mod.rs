@@ -23,14 +23,11 @@ pub mod tables;
 pub mod target;
 pub mod words;
 
-use crate::adjust::Observations;
 use crate::dataset::Dataset;
 use crate::dataset::corners::poses;
-use crate::dataset::split::without_excluded;
-use crate::dataset::sufficiency::check_sufficiency;
 use crate::detect::DetectSettings;
 use crate::error::Error;
-use crate::pipeline;
+use crate::pipeline::{self, camera_names, explained, offered};
 use crate::progress::Progress;
 use methods::{Method, MethodRun};
 use serde::Serialize;
@@ -146,21 +143,21 @@ pub fn evaluate(
     settings: &ExperimentSettings,
     progress: &dyn Progress,
 ) -> Result<Evaluation, Error> {
-    let views = pipeline::corners(dataset, &DetectSettings::default(), progress)?.views;
-    let all_poses = poses(&views);
-    let used = without_excluded(views, &dataset.excluded_poses).used;
-    check_sufficiency(dataset, &used)?;
-    let sensors = dataset.cameras.iter().map(|camera| camera.sensor).collect();
-    let offered = Observations::new(dataset.board, sensors, &used);
-    let names: Vec<String> = dataset.cameras.iter().map(|c| c.name.clone()).collect();
+    let corners = pipeline::corners(dataset, &DetectSettings::default(), progress)?;
+    let offered = offered(dataset, &corners)?;
+    let names = camera_names(dataset);
+    let all_poses = poses(&corners.views);
     let scene = auxiliary::scene(dataset)?;
     let mut left_out = Vec::new();
 
     progress.begin("calibrate with three methods", 0);
     let stage_entry = |pose| crate::dataset::stage::entry(dataset, &all_poses, pose);
-    let prepared = methods::run_all(&offered, &names, &|pose| stage_entry(pose).placement);
+    let prepared = methods::run_all(&offered.observations, &names, &|pose| {
+        stage_entry(pose).placement
+    });
     progress.end();
-    let (observations, runs) = prepared?;
+    let (observations, runs) =
+        prepared.map_err(|error| explained(error, dataset, &offered.views))?;
     if runs.iter().all(|run| run.outcome.is_err()) {
         let last = runs.iter().find_map(|run| run.outcome.as_ref().err());
         let last = last.cloned().unwrap_or_default();
