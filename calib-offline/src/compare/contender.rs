@@ -94,11 +94,11 @@ pub struct Failure(pub String);
 /// The methods, in the order of the table. The first is what the others are measured against.
 pub const CONTENDERS: [Contender; 3] = [
     Contender {
-        name: "pinhole",
+        name: "baseline",
         title: "pinhole, Brown-Conrady",
-        fit: |shared, names| fit_pinhole(&shared.observations, names),
+        fit: |shared, names| fit_baseline(&shared.observations, names),
         fold: |_, training| {
-            let fitted = fit_pinhole(training, &training.numbered_cameras())?;
+            let fitted = fit_baseline(training, &training.numbered_cameras())?;
             Ok(Estimated {
                 rig: fitted.rig,
                 board_shape: fitted.board_shape,
@@ -123,7 +123,7 @@ pub const CONTENDERS: [Contender; 3] = [
 ];
 
 /// The baseline. Its residuals count as the joint estimate's do, so that outliers decide for nobody.
-fn fit_pinhole(observations: &Observations, names: &[String]) -> Result<Fitted, Failure> {
+fn fit_baseline(observations: &Observations, names: &[String]) -> Result<Fitted, Failure> {
     let failure = |error: PinholeError| Failure(error.to_string());
     let settings = RigSettings {
         adjustment: Settings {

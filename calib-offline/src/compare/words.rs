@@ -323,7 +323,7 @@ pub(super) mod tests {
             held_out_corners: 1003,
             common_corners: 990,
             boards: 20,
-            methods: vec![method("pinhole", "pinhole", 1.0), better],
+            methods: vec![method("baseline", "pinhole", 1.0), better],
             conclusion: vec!["In words.".to_owned()],
         }
     }
