@@ -707,6 +707,6 @@ fn evaluations_that_cannot_be() {
     std::fs::write(home.path().join("set/matches_truth.csv"), empty).unwrap();
     run(home.path(), &["evaluate", "set"])
         .assert_code(2)
-        .assert_says(&["matches_truth.csv", "0 rows, its matches have 1"]);
+        .assert_says(&["matches_truth.csv", "has 0 rows, its matches 1"]);
     assert!(!home.path().join("evaluation").exists());
 }

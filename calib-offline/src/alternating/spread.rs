@@ -9,6 +9,7 @@
 
 use super::plane_map::{MIN_CORNERS, NetworkSettings, TrainingSet, errors_mm};
 use crate::adjust::observations::{ObservedCorner, ViewBlock};
+use crate::geometry::rms;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -151,10 +152,6 @@ fn error_at(views: &[PreparedView], spread_px: f64) -> Option<SpreadError> {
             left_out.extend(errors_mm(&set.train(spread_px)?, scored));
         }
     }
-    let rms = |errors: &[f64]| {
-        (!errors.is_empty())
-            .then(|| (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt())
-    };
     Some(SpreadError {
         spread_px,
         training_rms_mm: rms(&training)?,
