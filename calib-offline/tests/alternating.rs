@@ -4,15 +4,15 @@
 #[allow(dead_code, reason = "other tests use the rest")]
 mod against_truth;
 
-use against_truth::{observations, scene};
+use against_truth::{errors_and_share, observations, scene};
 use calib_offline::alternating::alternation::AlternationStop;
 use calib_offline::alternating::stage_circle::project_onto_circles;
 use calib_offline::alternating::start::StartKind;
 use calib_offline::alternating::{
     AlternatingError, AlternatingEstimate, AlternatingSettings, estimate,
 };
-use calib_offline::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
-use calib_offline::geometry::{Ray, RigidTransform, triangulate_rays};
+use calib_offline::evaluate::truth::TruthErrors;
+use calib_offline::geometry::RigidTransform;
 use calib_offline::init::rig::start_rig;
 use calib_offline::pipeline::alternatingly::alternating_solution;
 use calib_offline::pipeline::solution::Task;
@@ -28,22 +28,7 @@ fn run(scene: &Scene, settings: &AlternatingSettings) -> AlternatingEstimate {
 
 /// Errors of points, and the share of the matches that has a ray in both cameras.
 fn measure(scene: &Scene, found: &AlternatingEstimate) -> (TruthErrors, f64) {
-    let matches = scene.matches(MatchSet::Points, 1500);
-    let points: Vec<PointWithTruth> = matches
-        .iter()
-        .filter_map(|m| {
-            let rays: Vec<Ray> = (0..2)
-                .filter_map(|c| Some(found.cameras[c].ray(m.pixels[c])?.ray))
-                .collect();
-            Some(PointWithTruth {
-                measured_mm: triangulate_rays(&rays).ok()?.point_mm,
-                true_mm: m.point_in_datum,
-                oracle_mm: m.oracle_in_datum,
-            })
-        })
-        .collect();
-    let share = points.len() as f64 / matches.len() as f64;
-    (compare_with_truth(&points).unwrap(), share)
+    errors_and_share(found, &scene.matches(MatchSet::Points, 1500)).unwrap()
 }
 
 #[test]
