@@ -6,6 +6,7 @@ mod against_truth;
 
 use against_truth::{errors_and_share, observations, scene};
 use calib_offline::alternating::alternation::AlternationStop;
+use calib_offline::alternating::spread::SpreadError;
 use calib_offline::alternating::stage_circle::project_onto_circles;
 use calib_offline::alternating::start::StartKind;
 use calib_offline::alternating::{
@@ -33,7 +34,7 @@ fn measure(scene: &Scene, found: &AlternatingEstimate) -> (TruthErrors, f64) {
 
 #[test]
 fn points_come_as_near_to_the_oracle_as_promised() {
-    // What a prototype reached; five draws of each here have a mean of 1.02, 1.07 and 1.12.
+    // What a prototype reached; five draws of each in the bench have a mean of 1.02, 1.08 and 1.11.
     for (optics, most) in [
         (OpticsKind::Brown, 1.3),
         (OpticsKind::Paper, 1.4),
@@ -69,9 +70,15 @@ fn without_noise_only_the_networks_own_error_is_left() {
     });
     let found = run(&scene, &AlternatingSettings::default());
     let (errors, _) = measure(&scene, &found);
-    // A network of the flat limit is a quartic over a board: it is off by some um at its edge.
-    assert!(errors.placed_rms_mm < 5e-3, "{errors:?}");
-    assert!(found.alternated.rms_mm.last().unwrap() < &1e-3);
+    // What the network of a board is off by, as the sweep over spreads found it.
+    let of_spread = |tried: &&SpreadError| tried.spread_px == found.spread.spread_px;
+    let network_mm = found.spread.tried.iter().find(of_spread).unwrap();
+    let network_mm = network_mm.left_out_rms_mm;
+    // Boards that err alike: two rays, and depth 350 mm / 210 mm times as uncertain as they are.
+    let depth = 2f64.sqrt() * 350.0 / 210.0;
+    assert!(errors.placed_rms_mm < depth * network_mm, "{errors:?}");
+    // No control point lies farther from its ray than its network puts it.
+    assert!(*found.alternated.rms_mm.last().unwrap() < network_mm);
 }
 
 #[test]
@@ -117,9 +124,10 @@ fn the_stage_is_found_where_it_stood() {
             .collect();
         let (truth, _) = project_onto_circles(&true_poses, &corners).unwrap();
         for (radius, truth) in placement.circles.radii_mm.iter().zip(&truth.radii_mm) {
-            // Depths of boards are known to some 0.01 mm; an arc of 80 degrees amplifies that
-            // a few times, and its sense is common to all corners.
-            assert!((radius - truth).abs() < 0.1, "{radius} {truth}");
+            // Depth is uncertain by 0.29 mm per px of disparity at 350 mm: 0.02 mm for a corner,
+            // 0.004 mm for the rim of a plane through 195 of them. A radius from 17 such places on
+            // 80 degrees is so by 3.2 times as much.
+            assert!((radius - truth).abs() < 4.0 * 0.012, "{radius} {truth}");
         }
     }
     let hand_held = {
