@@ -5,6 +5,8 @@ pub mod boards;
 pub mod bootstrap;
 pub mod conclusion;
 pub mod contender;
+#[cfg(test)]
+mod example;
 mod figures;
 pub mod record;
 pub mod words;
