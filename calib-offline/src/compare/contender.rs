@@ -57,7 +57,10 @@ impl Shared {
         }
     }
 
-    /// The joint estimate, or why there is none.
+    /// The joint estimate.
+    ///
+    /// # Errors
+    /// [`Failure`] with why there is none.
     pub fn joint(&self) -> Result<&Estimate, Failure> {
         self.joint.as_ref().map_err(|error| Failure(chain(error)))
     }
