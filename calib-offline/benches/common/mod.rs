@@ -2,6 +2,8 @@
 
 #[path = "../../tests/common/against_truth.rs"]
 pub mod against_truth;
+#[path = "../../tests/common/halves.rs"]
+pub mod halves;
 
 use calib_offline::simulate::OpticsKind;
 use clap::ValueEnum;
