@@ -3,7 +3,7 @@
 //! Real corners have heavier tails than a Gaussian; simulated ones do not. The number of degrees
 //! of freedom comes from the residuals' own likelihood, so that Gaussian noise costs nothing.
 
-use super::normal_equations::Weights;
+use super::objective::Weights;
 use super::observations::Observations;
 use nalgebra::Vector2;
 
