@@ -5,21 +5,15 @@
 //! triangulates the same noisy pixels with the true rays; 1 is the limit that their noise sets.
 //! Draws run in parallel; every figure is a mean over them.
 
-#[path = "../tests/common/against_truth.rs"]
-#[allow(dead_code, reason = "the tests use the rest")]
-mod against_truth;
+#[allow(dead_code, reason = "other benches use the rest")]
+mod common;
 
-use against_truth::{Coverage, coverage, hand_held, measure_set, run_scene};
 use calib_offline::geometry::SensorSize;
 use calib_offline::joint::Estimate;
 use calib_offline::simulate::{MatchSet, OpticsKind, Scene, SceneSettings};
-use rayon::prelude::*;
+use common::against_truth::{Coverage, coverage, hand_held, measure_set, run_scene};
+use common::{Arguments, Result, print_table};
 use std::process::ExitCode;
-
-type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
-
-/// Noise draws of a row unless told otherwise.
-const DRAWS: u64 = 5;
 
 /// A row: its name, and the scene of a draw.
 struct Row {
@@ -172,29 +166,16 @@ const ROWS: [Row; 26] = [
 ];
 
 fn main() -> ExitCode {
-    match table(std::env::args().skip(1)) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("{error}");
-            ExitCode::FAILURE
-        }
-    }
+    print_table(table)
 }
 
-fn table(arguments: impl Iterator<Item = String>) -> Result<()> {
-    let (mut names, mut draws, mut detail) = (Vec::new(), DRAWS, false);
-    let mut arguments = arguments.filter(|argument| argument != "--bench");
-    while let Some(argument) = arguments.next() {
-        match argument.as_str() {
-            "--draws" => draws = arguments.next().ok_or("--draws needs a number")?.parse()?,
-            "--detail" => detail = true,
-            name if ROWS.iter().any(|row| row.name == name) => names.push(argument),
-            other => {
-                let known: Vec<&str> = ROWS.iter().map(|row| row.name).collect();
-                return Err(format!("no row {other}; there are {}", known.join(", ")).into());
-            }
-        }
+fn table(arguments: &Arguments) -> Result<()> {
+    let is_row = |name: &&String| ROWS.iter().any(|row| row.name == **name);
+    if let Some(other) = arguments.names.iter().find(|name| !is_row(name)) {
+        let known: Vec<&str> = ROWS.iter().map(|row| row.name).collect();
+        return Err(format!("no row {other}; there are {}", known.join(", ")).into());
     }
+    let draws = arguments.draws;
     println!(
         "{draws} draws each. RMS error over the oracle's, after the rigid placement that suits best | as it \
          is;\nshare of errors inside their 68 % and 95 % ellipsoid; RMS error with exact pixels over \
@@ -205,14 +186,9 @@ fn table(arguments: impl Iterator<Item = String>) -> Result<()> {
         "", "points", "held-out boards", "worst", "68 %", "95 %", "calibration", "outside"
     );
     for row in &ROWS {
-        if names.is_empty() || names.iter().any(|name| name == row.name) {
-            let drawn: Vec<Drawn> = (1..=draws)
-                .into_par_iter()
-                .map(|seed| {
-                    draw(row, seed).map_err(|error| format!("{} {seed}: {error}", row.name))
-                })
-                .collect::<std::result::Result<_, String>>()?;
-            if detail {
+        if arguments.names.is_empty() || arguments.names.iter().any(|name| name == row.name) {
+            let drawn = arguments.drawn(row.name, |seed| draw(row, seed))?;
+            if arguments.detail {
                 drawn.iter().for_each(Drawn::print);
             }
             print(row, &drawn);
@@ -232,8 +208,8 @@ struct Drawn {
     outside_share: f64,
 }
 
-fn draw(row: &Row, seed: u64) -> std::result::Result<Drawn, String> {
-    let scene = (row.scene)(seed).map_err(|error| error.to_string())?;
+fn draw(row: &Row, seed: u64) -> Result<Drawn> {
+    let scene = (row.scene)(seed)?;
     let (mut estimate, findings) = run_scene(&scene);
     let [points, holdout] =
         [MatchSet::Points, MatchSet::Holdout].map(|set| measure_set(&scene, &estimate, set));

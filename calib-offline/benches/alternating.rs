@@ -5,19 +5,18 @@
 //! noisy pixels with the true rays. Ratios are of RMS errors of points after the rigid placement that
 //! suits best; the share of matches with a ray in both cameras stands beside.
 
-use calib_offline::adjust::Observations;
+#[allow(dead_code, reason = "other benches use the rest")]
+mod common;
+
 use calib_offline::alternating::alternation::AlternationSettings;
-use calib_offline::alternating::{AlternatingEstimate, AlternatingSettings, estimate};
-use calib_offline::evaluate::truth::{PointWithTruth, compare_with_truth};
-use calib_offline::geometry::triangulate_rays;
+use calib_offline::alternating::{AlternatingSettings, estimate};
 use calib_offline::init::rig::start_rig;
-use calib_offline::simulate::{CameraOptics, MatchSet, OpticsKind, Scene, SceneSettings};
-use rayon::prelude::*;
+use calib_offline::simulate::{MatchSet, OpticsKind, Scene, SceneSettings};
+use common::against_truth::{errors_and_share, observations};
+use common::{Arguments, Result, print_table};
 use std::process::ExitCode;
 
-type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
-
-const DRAWS: u64 = 5;
+/// A ray of the table costs a network per board: fewer points than elsewhere do.
 const MATCHES: usize = 2000;
 
 /// A way of doing it.
@@ -66,39 +65,19 @@ const VARIANTS: [Variant; 5] = [
 ];
 
 fn main() -> ExitCode {
-    match table(std::env::args().skip(1)) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("{error}");
-            ExitCode::FAILURE
-        }
-    }
+    print_table(table)
 }
 
-fn table(arguments: impl Iterator<Item = String>) -> Result<()> {
-    let (mut kinds, mut draws) = (Vec::new(), DRAWS);
-    let mut arguments = arguments.filter(|argument| argument != "--bench");
-    while let Some(argument) = arguments.next() {
-        if argument == "--draws" {
-            draws = arguments.next().ok_or("--draws needs a number")?.parse()?;
-        } else {
-            let known = OpticsKind::ALL.iter().find(|k| k.name() == argument);
-            kinds.push(*known.ok_or(format!("no optics {argument}"))?);
-        }
-    }
-    if kinds.is_empty() {
-        use OpticsKind::{Brown, Bumps, Paper, Port, Window};
-        kinds = vec![Brown, Paper, Bumps, Window, Port];
-    }
+fn table(arguments: &Arguments) -> Result<()> {
+    use OpticsKind::{Brown, Bumps, Paper, Port, Window};
     println!(
-        "{draws} draws each: mean (worst) ratio, points | held-out boards, share measured, sweeps\n"
+        "{} draws each: mean (worst) ratio, points | held-out boards, share measured, sweeps\n",
+        arguments.draws
     );
-    for kind in kinds {
+    for kind in arguments.optics(&[Brown, Paper, Bumps, Window, Port])? {
         for variant in &VARIANTS {
-            let drawn: Vec<Drawn> = (1..=draws)
-                .into_par_iter()
-                .map(|seed| draw(kind, seed, &(variant.settings)()))
-                .collect::<std::result::Result<_, String>>()?;
+            let drawn =
+                arguments.drawn(kind.name(), |seed| draw(kind, seed, &(variant.settings)()))?;
             print(kind, variant, &drawn);
         }
     }
@@ -112,47 +91,22 @@ struct Drawn {
     sweeps: usize,
 }
 
-fn draw(
-    kind: OpticsKind,
-    seed: u64,
-    settings: &AlternatingSettings,
-) -> std::result::Result<Drawn, String> {
-    let words = |error: &dyn std::fmt::Display| format!("{} {seed}: {error}", kind.name());
-    let scene =
-        Scene::new(SceneSettings::standard_noisy(kind, seed)).map_err(|error| words(&error))?;
-    let sensors = scene.cameras.iter().map(CameraOptics::sensor).collect();
-    let observations = Observations::new(scene.settings.board, sensors, &scene.observe_corners());
-    let start = start_rig(&observations).map_err(|error| words(&error))?;
+fn draw(kind: OpticsKind, seed: u64, settings: &AlternatingSettings) -> Result<Drawn> {
+    let scene = Scene::new(SceneSettings::standard_noisy(kind, seed))?;
+    let observations = observations(&scene, &scene.observe_corners());
+    let start = start_rig(&observations)?;
     let placement = |pose: usize| scene.pose_placements.get(pose).copied();
-    let found = estimate(&start, &placement, settings).map_err(|error| words(&error))?;
-    let (points, share) =
-        measure(&scene, &found, MatchSet::Points).ok_or_else(|| words(&"nothing measured"))?;
-    let (holdout, _) =
-        measure(&scene, &found, MatchSet::Holdout).ok_or_else(|| words(&"nothing measured"))?;
+    let found = estimate(&start, &placement, settings)?;
+    let measure =
+        |set| errors_and_share(&found, &scene.matches(set, MATCHES)).ok_or("nothing was measured");
+    let (points, share) = measure(MatchSet::Points)?;
+    let (holdout, _) = measure(MatchSet::Holdout)?;
     Ok(Drawn {
-        points,
-        holdout,
+        points: points.placed_ratio,
+        holdout: holdout.placed_ratio,
         share,
         sweeps: found.alternated.rms_mm.len() - 1,
     })
-}
-
-fn measure(scene: &Scene, found: &AlternatingEstimate, set: MatchSet) -> Option<(f64, f64)> {
-    let matches = scene.matches(set, MATCHES);
-    let points: Vec<PointWithTruth> = matches
-        .iter()
-        .filter_map(|m| {
-            let rays = [0, 1].map(|c: usize| found.cameras[c].ray(m.pixels[c]));
-            let rays: Vec<_> = rays.into_iter().flatten().map(|r| r.ray).collect();
-            Some(PointWithTruth {
-                measured_mm: triangulate_rays(&rays).ok()?.point_mm,
-                true_mm: m.point_in_datum,
-                oracle_mm: m.oracle_in_datum,
-            })
-        })
-        .collect();
-    let share = points.len() as f64 / matches.len() as f64;
-    Some((compare_with_truth(&points)?.placed_ratio, share))
 }
 
 fn print(kind: OpticsKind, variant: &Variant, drawn: &[Drawn]) {

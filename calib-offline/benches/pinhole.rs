@@ -5,28 +5,22 @@
 //! `cargo bench -p calib-offline --bench pinhole -- [OPTICS ...] [--draws N]`. The oracle
 //! triangulates the same noisy pixels with the true rays; 1 is the limit that their noise sets.
 
+#[allow(dead_code, reason = "other benches use the rest")]
+mod common;
+
 use calib_offline::adjust::Observations;
-use calib_offline::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
 use calib_offline::geometry::RigidTransform;
 use calib_offline::init::focal_scan::start_camera;
 use calib_offline::pinhole::adjustment::{Free, State, minimize};
 use calib_offline::pinhole::{
     BrownCamera, Loss, PinholeRig, Refine, RigSettings, Settings, calibrate_rig, stereo,
 };
-use calib_offline::simulate::{
-    CameraOptics, MatchSet, OpticsKind, Scene, SceneSettings, TrueMatch,
-};
-use clap::ValueEnum;
-use rayon::prelude::*;
+use calib_offline::simulate::{MatchSet, OpticsKind, Scene, SceneSettings};
+use common::against_truth::{MATCHES, errors_and_share, observations};
+use common::{Arguments, Result, print_table};
 use std::process::ExitCode;
 use std::time::Instant;
 
-type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;
-
-/// Noise draws unless told otherwise.
-const DRAWS: u64 = 5;
-/// Points that each comparison measures.
-const MATCHES: usize = 3000;
 const OPTICS: [OpticsKind; 5] = [
     OpticsKind::Brown,
     OpticsKind::Paper,
@@ -36,28 +30,11 @@ const OPTICS: [OpticsKind; 5] = [
 ];
 
 fn main() -> ExitCode {
-    match table(std::env::args().skip(1)) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("{error}");
-            ExitCode::FAILURE
-        }
-    }
+    print_table(table)
 }
 
-fn table(arguments: impl Iterator<Item = String>) -> Result<()> {
-    let (mut optics, mut draws) = (Vec::new(), DRAWS);
-    let mut arguments = arguments.filter(|argument| argument != "--bench");
-    while let Some(argument) = arguments.next() {
-        if argument == "--draws" {
-            draws = arguments.next().ok_or("--draws needs a number")?.parse()?;
-        } else {
-            optics.push(OpticsKind::from_str(&argument, true)?);
-        }
-    }
-    if optics.is_empty() {
-        optics = OPTICS.into();
-    }
+fn table(arguments: &Arguments) -> Result<()> {
+    let draws = arguments.draws;
     println!(
         "{draws} draws each. RMS error over the oracle's after the best rigid placement: points | held-out \
          boards;\nof two cameras per draw, how many reached their lowest minimum from each start: conic, fixed \
@@ -67,11 +44,8 @@ fn table(arguments: impl Iterator<Item = String>) -> Result<()> {
         "{:<11} {:>17} {:>17} {:>17} {:>8} {:>10} {:>7} {:>7}",
         "", "extrinsics only", "everything", "Student-t", "RMS px", "starts", "rig s", "fit s"
     );
-    for optics in optics {
-        let drawn: Vec<Drawn> = (1..=draws)
-            .into_par_iter()
-            .map(|seed| draw(optics, seed))
-            .collect::<Result<_>>()?;
+    for optics in arguments.optics(&OPTICS)? {
+        let drawn = arguments.drawn(optics.name(), |seed| draw(optics, seed))?;
         print(optics, &drawn);
     }
     Ok(())
@@ -91,8 +65,7 @@ struct Drawn {
 
 fn draw(optics: OpticsKind, seed: u64) -> Result<Drawn> {
     let scene = Scene::new(SceneSettings::standard_noisy(optics, seed))?;
-    let sensors = scene.cameras.iter().map(CameraOptics::sensor).collect();
-    let observations = Observations::new(scene.settings.board, sensors, &scene.observe_corners());
+    let observations = observations(&scene, &scene.observe_corners());
     let fit_seconds = fit_seconds(&observations.of_camera(0))?;
     let started = Instant::now();
     let everything = calibrate_rig(&observations, &RigSettings::default())?;
@@ -117,8 +90,9 @@ fn draw(optics: OpticsKind, seed: u64) -> Result<Drawn> {
     )?;
     let sets = [MatchSet::Points, MatchSet::Holdout].map(|set| scene.matches(set, MATCHES));
     let ratio = |rig: &PinholeRig| -> Result<(f64, f64)> {
-        let [points, holdout] = [0, 1].map(|k| errors(rig, &sets[k]));
-        Ok((points?.placed_ratio, holdout?.placed_ratio))
+        let [points, holdout] = [0, 1].map(|k| errors_and_share(rig, &sets[k]));
+        let (points, holdout) = points.zip(holdout).ok_or("no point was measured")?;
+        Ok((points.0.placed_ratio, holdout.0.placed_ratio))
     };
     let mut reached = [0; 3];
     for fit in &everything.fits {
@@ -149,23 +123,6 @@ fn fit_seconds(own: &Observations) -> Result<f64> {
     let started = Instant::now();
     minimize(state, own, Free::Intrinsics, &Settings::default())?;
     Ok(started.elapsed().as_secs_f64())
-}
-
-fn errors(rig: &PinholeRig, matches: &[TrueMatch]) -> Result<TruthErrors> {
-    let points: Vec<PointWithTruth> = matches
-        .iter()
-        .filter_map(|m| {
-            let point = rig
-                .triangulate(&[(0, m.pixels[0]), (1, m.pixels[1])])
-                .ok()?;
-            Some(PointWithTruth {
-                measured_mm: point.point_mm,
-                true_mm: m.point_in_datum,
-                oracle_mm: m.oracle_in_datum,
-            })
-        })
-        .collect();
-    Ok(compare_with_truth(&points).ok_or("no point was measured")?)
 }
 
 fn print(optics: OpticsKind, drawn: &[Drawn]) {

@@ -239,7 +239,6 @@ impl Error {
             | Self::Estimate(_)
             | Self::Pinhole(_)
             | Self::Alternating(_)
-            | Self::Experiment(ExperimentError::NoMethod { .. })
             | Self::Pack(PackError::NothingCalibrated { .. }) => DATA_UNDETERMINED,
             Self::Manifest(_)
             | Self::Corners(_)

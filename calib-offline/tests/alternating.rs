@@ -4,16 +4,20 @@
 #[allow(dead_code, reason = "other tests use the rest")]
 mod against_truth;
 
-use against_truth::{observations, scene};
+use against_truth::{errors_and_share, observations, scene};
 use calib_offline::alternating::alternation::AlternationStop;
+use calib_offline::alternating::spread::SpreadError;
 use calib_offline::alternating::stage_circle::project_onto_circles;
 use calib_offline::alternating::start::StartKind;
 use calib_offline::alternating::{
     AlternatingError, AlternatingEstimate, AlternatingSettings, estimate,
 };
-use calib_offline::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
-use calib_offline::geometry::{Ray, RigidTransform, triangulate_rays};
+use calib_offline::evaluate::truth::TruthErrors;
+use calib_offline::geometry::RigidTransform;
 use calib_offline::init::rig::start_rig;
+use calib_offline::pipeline::alternatingly::alternating_solution;
+use calib_offline::pipeline::solution::Task;
+use calib_offline::progress::Silent;
 use calib_offline::simulate::{MatchSet, OpticsKind, Scene};
 
 fn run(scene: &Scene, settings: &AlternatingSettings) -> AlternatingEstimate {
@@ -25,27 +29,12 @@ fn run(scene: &Scene, settings: &AlternatingSettings) -> AlternatingEstimate {
 
 /// Errors of points, and the share of the matches that has a ray in both cameras.
 fn measure(scene: &Scene, found: &AlternatingEstimate) -> (TruthErrors, f64) {
-    let matches = scene.matches(MatchSet::Points, 1500);
-    let points: Vec<PointWithTruth> = matches
-        .iter()
-        .filter_map(|m| {
-            let rays: Vec<Ray> = (0..2)
-                .filter_map(|c| Some(found.cameras[c].ray(m.pixels[c])?.ray))
-                .collect();
-            Some(PointWithTruth {
-                measured_mm: triangulate_rays(&rays).ok()?.point_mm,
-                true_mm: m.point_in_datum,
-                oracle_mm: m.oracle_in_datum,
-            })
-        })
-        .collect();
-    let share = points.len() as f64 / matches.len() as f64;
-    (compare_with_truth(&points).unwrap(), share)
+    errors_and_share(found, &scene.matches(MatchSet::Points, 1500)).unwrap()
 }
 
 #[test]
 fn points_come_as_near_to_the_oracle_as_promised() {
-    // What a prototype reached; five draws of each here have a mean of 1.02, 1.07 and 1.12.
+    // What a prototype reached; five draws of each in the bench have a mean of 1.02, 1.08 and 1.11.
     for (optics, most) in [
         (OpticsKind::Brown, 1.3),
         (OpticsKind::Paper, 1.4),
@@ -81,9 +70,15 @@ fn without_noise_only_the_networks_own_error_is_left() {
     });
     let found = run(&scene, &AlternatingSettings::default());
     let (errors, _) = measure(&scene, &found);
-    // A network of the flat limit is a quartic over a board: it is off by some um at its edge.
-    assert!(errors.placed_rms_mm < 5e-3, "{errors:?}");
-    assert!(found.alternated.rms_mm.last().unwrap() < &1e-3);
+    // What the network of a board is off by, as the sweep over spreads found it.
+    let of_spread = |tried: &&SpreadError| tried.spread_px == found.spread.spread_px;
+    let network_mm = found.spread.tried.iter().find(of_spread).unwrap();
+    let network_mm = network_mm.left_out_rms_mm;
+    // Boards that err alike: two rays, and depth 350 mm / 210 mm times as uncertain as they are.
+    let depth = 2f64.sqrt() * 350.0 / 210.0;
+    assert!(errors.placed_rms_mm < depth * network_mm, "{errors:?}");
+    // No control point lies farther from its ray than its network puts it.
+    assert!(*found.alternated.rms_mm.last().unwrap() < network_mm);
 }
 
 #[test]
@@ -129,9 +124,10 @@ fn the_stage_is_found_where_it_stood() {
             .collect();
         let (truth, _) = project_onto_circles(&true_poses, &corners).unwrap();
         for (radius, truth) in placement.circles.radii_mm.iter().zip(&truth.radii_mm) {
-            // Depths of boards are known to some 0.01 mm; an arc of 80 degrees amplifies that
-            // a few times, and its sense is common to all corners.
-            assert!((radius - truth).abs() < 0.1, "{radius} {truth}");
+            // Depth is uncertain by 0.29 mm per px of disparity at 350 mm: 0.02 mm for a corner,
+            // 0.004 mm for the rim of a plane through 195 of them. A radius from 17 such places on
+            // 80 degrees is so by 3.2 times as much.
+            assert!((radius - truth).abs() < 4.0 * 0.012, "{radius} {truth}");
         }
     }
     let hand_held = {
@@ -170,9 +166,52 @@ fn boards_in_one_depth_support_no_ray() {
         settings.angles_deg = vec![-1.0, -0.5, 0.0, 0.5, 1.0];
     });
     let observations = observations(&scene, &scene.observe_corners());
-    let Ok(start) = start_rig(&observations) else {
-        return;
-    };
+    let start = start_rig(&observations).unwrap();
     let error = estimate(&start, &|_| None, &AlternatingSettings::default()).unwrap_err();
     assert_eq!(error, AlternatingError::FewBoards);
+}
+
+#[test]
+fn a_start_that_does_not_exist_is_not_blamed_on_the_boards() {
+    let scene = scene(OpticsKind::Brown, |_| ());
+    let observations = observations(&scene, &scene.observe_corners());
+    let mut start = start_rig(&observations).unwrap();
+    // One view makes no pinhole of the second camera; the start still has its place.
+    let views = &mut start.observations.views;
+    views.retain(|view| view.camera_idx == 0 || view.pose_idx == 0);
+    let wanted = AlternatingSettings {
+        start: Some(StartKind::PinholeRig),
+        ..AlternatingSettings::default()
+    };
+    let found = estimate(&start, &|_| None, &wanted).map(|found| found.starts);
+    assert_eq!(found, Err(AlternatingError::NoStart));
+    let any = AlternatingSettings::default();
+    let found = estimate(&start, &|_| None, &any).map(|found| found.starts.len());
+    assert_eq!(found, Ok(1));
+}
+
+#[test]
+fn corners_outside_the_calibrated_area_are_no_outliers() {
+    // With little noise, what a field says beyond its rays lies far beyond the noise.
+    let scene = scene(OpticsKind::Brown, |settings| settings.noise_px = 0.002);
+    let task = Task {
+        names: &["left".to_owned(), "right".to_owned()],
+        folds: 0,
+        placement: &|pose| Some(scene.pose_placements[pose]),
+    };
+    let offered = observations(&scene, &scene.observe_corners());
+    let found = alternating_solution(&offered, &task, &Silent)
+        .unwrap()
+        .solution;
+    let mut outside = 0;
+    for (view, residuals) in found.observations.views.iter().zip(&found.residuals) {
+        let coverage = &found.rig.cameras[view.camera_idx].coverage;
+        for (corner, residual) in view.corners.iter().zip(residuals) {
+            assert_eq!(residual.is_some(), coverage.contains(corner.pixel));
+            outside += usize::from(residual.is_none());
+        }
+    }
+    assert!(outside > 0);
+    // Gaussian noise goes beyond 8 standard deviations once in 10^14 corners.
+    assert_eq!(found.rejected_count(), 0);
 }

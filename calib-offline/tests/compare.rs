@@ -46,29 +46,29 @@ fn behind_a_port_the_ray_field_gains_and_the_files_say_so() {
         (&object["poses"], &object["folds"]),
         (&14.into(), &5.into())
     );
-    let (pinhole, joint) = (method(&object, "pinhole"), method(&object, "joint"));
-    for own in [pinhole, joint] {
+    let (baseline, joint) = (method(&object, "baseline"), method(&object, "joint"));
+    for own in [baseline, joint] {
         assert!(own["failure"].is_null());
         assert_eq!(own["truth"].as_array().unwrap().len(), 2);
         // Both from the same corners.
         assert_eq!(own["training"]["corners"], joint["training"]["corners"]);
         assert_eq!(own["held_out"]["points"], joint["held_out"]["points"]);
     }
-    assert!(number(&pinhole["conversion_error_px"]) < 1e-4);
+    assert!(number(&baseline["conversion_error_px"]) < 1e-4);
     // Noise of 0.05 px per axis.
     let fitted = number(&joint["training"]["rms_px"]);
     assert!((0.06..0.08).contains(&fitted), "{fitted}");
-    assert!(number(&pinhole["training"]["rms_px"]) > 1.3 * fitted);
+    assert!(number(&baseline["training"]["rms_px"]) > 1.3 * fitted);
     let rigid = &joint["against_first"]["rigid"];
     assert!(number(&rigid["low"]) < number(&rigid["ratio"]));
     assert!(number(&rigid["high"]) < 0.95, "{rigid}");
-    assert!(pinhole["against_first"].is_null());
+    assert!(baseline["against_first"].is_null());
     let ratio = |own: &Value| number(&own["truth"][0]["errors"]["placed_ratio"]);
     assert!(
-        ratio(joint) < 1.2 && ratio(pinhole) > 1.5,
+        ratio(joint) < 1.2 && ratio(baseline) > 1.5,
         "{} {}",
         ratio(joint),
-        ratio(pinhole)
+        ratio(baseline)
     );
     let conclusion = object["conclusion"].to_string();
     assert!(
@@ -137,7 +137,7 @@ fn one_camera_alone_is_compared_by_its_residuals() {
     fs::write(set.join("corners.csv"), left.join("\n")).unwrap();
     let found = run(folder.path(), &["compare", "set", "--json"]);
     let object = found.assert_code(0).json();
-    for name in ["pinhole", "joint"] {
+    for name in ["baseline", "joint"] {
         let own = method(&object, name);
         assert!(number(&own["held_out"]["rms_px"]) < 0.1, "{own}");
         assert!(own["held_out"]["neighbor_rms_mm"].is_null());
@@ -202,18 +202,18 @@ fn a_method_that_fails_leaves_the_others_standing() {
     simulate(folder.path(), "brown");
     let dataset = Dataset::load(&folder.path().join("set")).unwrap();
     let corners = pipeline::corners(&dataset, &DetectSettings::default(), &Silent).unwrap();
-    let [pinhole, _, joint] = &CONTENDERS;
+    let [baseline, _, joint] = &CONTENDERS;
     let methods = [
         Contender {
             name: "never",
             title: "never",
             fit: |_, _| Err(Failure("there is none".to_owned())),
-            fold: pinhole.fold,
+            fold: baseline.fold,
         },
         Contender {
             name: "no-folds",
             title: "no folds",
-            fit: pinhole.fit,
+            fit: baseline.fit,
             fold: |_, _| Err(Failure("too few".to_owned())),
         },
         *joint,

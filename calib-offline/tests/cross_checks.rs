@@ -3,36 +3,16 @@
 
 mod common;
 
-use calib_offline::dataset::View;
 use calib_offline::evaluate::central_model::CentralModel;
-use calib_offline::evaluate::half_data::{HalfData, HalfDataCheck, Skipped, first_half};
+use calib_offline::evaluate::cross_check;
+use calib_offline::evaluate::half_data::{HalfDataCheck, Skipped};
 use calib_offline::evaluate::working_volume::{Match, compare, matches_at, span};
-use calib_offline::evaluate::{CrossChecks, cross_check};
 use calib_offline::field::Rig;
 use calib_offline::geometry::best_placement;
 use calib_offline::geometry::{Ray, nearest_point, triangulate_pair};
-use calib_offline::joint::Estimate;
 use calib_offline::simulate::{OpticsKind, Scene};
 use common::against_truth::{run_scene, run_views, scene};
-
-fn names() -> [String; 2] {
-    ["left".to_owned(), "right".to_owned()]
-}
-
-fn checked(scene: &Scene, estimate: &Estimate) -> CrossChecks {
-    let first = first_half(estimate.observations.poses.iter().copied(), |pose| {
-        scene.pose_placements.get(pose).copied()
-    });
-    cross_check(estimate, &estimate.rig(&names()), Some(&first))
-}
-
-fn halves_of(scene: &Scene, views: &[View]) -> HalfData {
-    let (estimate, _) = run_views(scene, views);
-    match checked(scene, &estimate).half_data {
-        HalfDataCheck::Compared(halves) => halves,
-        HalfDataCheck::Skipped(reason) => panic!("{reason:?}"),
-    }
-}
+use common::halves::{checked, halves_of, halves_of_one_camera, names};
 
 /// Noise draws per kind of optics.
 const SEEDS: u64 = 4;
@@ -92,21 +72,6 @@ fn few_poses_are_not_halved() {
         unasked.half_data,
         HalfDataCheck::Skipped(Skipped::NotWanted)
     );
-}
-
-fn halves_of_one_camera(seed: u64) -> HalfData {
-    let mut scene = scene(OpticsKind::Brown, |s| s.seed = seed);
-    let mut views = scene.observe_corners();
-    views.retain(|view| view.camera_idx == 0);
-    scene.cameras.truncate(1);
-    let (estimate, _) = run_views(&scene, &views);
-    let poses = estimate.observations.poses.iter().copied();
-    let first = first_half(poses, |pose| scene.pose_placements.get(pose).copied());
-    let checks = cross_check(&estimate, &estimate.rig(&names()[..1]), Some(&first));
-    match checks.half_data {
-        HalfDataCheck::Compared(halves) => halves,
-        HalfDataCheck::Skipped(reason) => panic!("{reason:?}"),
-    }
 }
 
 #[test]
@@ -210,30 +175,4 @@ fn a_central_rig_loses_nothing_by_being_central() {
             .iter()
             .all(|c| c.central && c.rms_mm == 0.0)
     );
-}
-
-#[test]
-#[ignore = "prints figures for BENCHMARKS.md and asserts none; takes minutes"]
-fn ratios_of_half_data_checks() {
-    let print = |what: &str, of_seed: &dyn Fn(u64) -> HalfData| {
-        let ratios: Vec<f64> = (1..=8).map(|seed| of_seed(seed).ratio).collect();
-        let count = ratios.len() as f64;
-        let mean = ratios.iter().sum::<f64>() / count;
-        let rms = (ratios.iter().map(|r| r * r).sum::<f64>() / count).sqrt();
-        let least = ratios.iter().copied().fold(f64::INFINITY, f64::min);
-        let most = ratios.iter().copied().fold(0.0, f64::max);
-        println!("{what}: {least:.2} to {most:.2}, mean {mean:.3}, rms {rms:.3}");
-    };
-    for (what, optics) in [
-        ("brown", OpticsKind::Brown),
-        ("port", OpticsKind::Port),
-        ("paper", OpticsKind::Paper),
-        ("bumps", OpticsKind::Bumps),
-    ] {
-        print(what, &|seed| {
-            let scene = scene(optics, |s| s.seed = seed);
-            halves_of(&scene, &scene.observe_corners())
-        });
-    }
-    print("brown, one camera", &halves_of_one_camera);
 }

@@ -11,7 +11,7 @@ use calib_offline::experiments::words::text;
 use calib_offline::experiments::{Evaluation, ExperimentSettings, evaluate};
 use calib_offline::progress::Silent;
 use calib_offline::simulate::{OpticsKind, OutputSettings, Scene, SceneSettings, write_dataset};
-use common::{MANIFEST, corners_csv, dataset, run};
+use common::{MANIFEST, contents, corners_csv, dataset, run};
 use std::fs;
 use std::path::Path;
 
@@ -246,4 +246,53 @@ fn the_command_writes_all_files_and_takes_away_those_of_an_earlier_run() {
     let evaluation = &object["evaluations"][0];
     assert_eq!(evaluation["name"], "set");
     assert_eq!(evaluation["left_out"].as_array().unwrap().len(), 4);
+}
+
+#[test]
+fn evaluations_that_cannot_be() {
+    let home = dataset(MANIFEST, corners_csv(6).as_bytes());
+    let before = contents(home.path());
+    for (arguments, parts) in [
+        (&["evaluate"][..], &["DATASET"][..]),
+        (&["evaluate", "set", "--paper-set-up"], &["--paper-set-up"]),
+        (&["evaluate", "nowhere"], &["nowhere", "try: "]),
+        (
+            &["evaluate", "set", "-o", "set/corners.csv"],
+            &["corners.csv", "try: "],
+        ),
+    ] {
+        run(home.path(), arguments)
+            .assert_code(2)
+            .assert_says(parts);
+        assert_eq!(contents(home.path()), before, "{arguments:?}");
+    }
+    let manifest = home.path().join("set/dataset.toml");
+    let excluding = format!("[dataset]\nexclude = [6]\n{MANIFEST}");
+    fs::write(&manifest, excluding).unwrap();
+    run(home.path(), &["evaluate", "set"])
+        .assert_code(2)
+        .assert_says(&["no pose 6", "the last is pose 5", "try: "]);
+    assert!(!home.path().join("evaluation").exists());
+    fs::write(&manifest, MANIFEST).unwrap();
+    let truth = home.path().join("set/truth.json");
+    for (content, part) in [("{", "EOF"), ("{\"settings\": {}}", "missing field")] {
+        fs::write(&truth, content).unwrap();
+        run(home.path(), &["evaluate", "set"])
+            .assert_code(2)
+            .assert_says(&["truth.json: is not the truth", part, "try: "]);
+        assert!(!home.path().join("evaluation").exists());
+    }
+    fs::remove_file(&truth).unwrap();
+    let header = "id,u_left,v_left,u_right,v_right\n1,300,200,310,200\n";
+    fs::write(home.path().join("set/matches.csv"), header).unwrap();
+    fs::write(home.path().join("set/matches_truth.csv"), "id,x\n1,2\n").unwrap();
+    run(home.path(), &["evaluate", "set"])
+        .assert_code(2)
+        .assert_says(&["matches_truth.csv", "missing field"]);
+    let empty = "x,y,z,x_oracle,y_oracle,z_oracle\n";
+    fs::write(home.path().join("set/matches_truth.csv"), empty).unwrap();
+    run(home.path(), &["evaluate", "set"])
+        .assert_code(2)
+        .assert_says(&["matches_truth.csv", "has 0 rows, its matches 1"]);
+    assert!(!home.path().join("evaluation").exists());
 }

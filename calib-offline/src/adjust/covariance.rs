@@ -3,7 +3,8 @@
 use super::assembly::Components;
 use super::cholesky::gram;
 use super::model::{Layout, Model};
-use super::normal_equations::{Eliminated, NormalEquations, Reduced, parameters_to_columns};
+use super::normal_equations::{NormalEquations, parameters_to_columns};
+use super::reduced::{Eliminated, Reduced};
 use super::residual::linearize;
 use crate::geometry::PixelPoint;
 use crate::geometry::so3::skew;

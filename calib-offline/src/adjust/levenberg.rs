@@ -1,8 +1,10 @@
 //! Levenberg-Marquardt on the blocked normal equations, weights and priors held fixed.
 
 use super::model::Model;
-use super::normal_equations::{NormalEquations, Priors, Weights, cost};
+use super::normal_equations::NormalEquations;
+use super::objective::{Weights, cost};
 use super::observations::{Observations, ViewBasis};
+use super::priors::Priors;
 
 /// When to stop.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,7 +3,7 @@
 //! Real corners have heavier tails than a Gaussian; simulated ones do not. The number of degrees
 //! of freedom comes from the residuals' own likelihood, so that Gaussian noise costs nothing.
 
-use super::normal_equations::Weights;
+use super::objective::Weights;
 use super::observations::Observations;
 use nalgebra::Vector2;
 
@@ -124,37 +124,17 @@ pub fn reweight(
     strength: f64,
     known: Option<&StudentT>,
 ) -> (StudentT, Weights) {
-    let squared: Vec<Vec<Option<f64>>> = residuals
-        .iter()
-        .zip(&observations.views)
-        .map(|(residuals, view)| {
-            residuals
-                .iter()
-                .zip(&view.corners)
-                .map(|(residual, corner)| {
-                    let squared = residual.as_ref()?.norm_squared() * corner.relative_weight;
-                    squared.is_finite().then_some(squared)
-                })
-                .collect()
-        })
-        .collect();
+    let squared = per_corner(residuals, observations, |residual, relative_weight| {
+        let squared = residual.as_ref()?.norm_squared() * relative_weight;
+        squared.is_finite().then_some(squared)
+    });
     let flat: Vec<f64> = squared.iter().flatten().filter_map(|s| *s).collect();
     let noise = StudentT::fit(&flat, FLOOR_PX * FLOOR_PX, known);
-    let weights = squared
-        .iter()
-        .zip(&observations.views)
-        .map(|(squared, view)| {
-            squared
-                .iter()
-                .zip(&view.corners)
-                .map(|(squared, corner)| {
-                    squared.map_or(0.0, |s| {
-                        strength * noise.weight(s) * corner.relative_weight / noise.variance_px2
-                    })
-                })
-                .collect()
+    let weights = per_corner(&squared, observations, |squared, relative_weight| {
+        squared.map_or(0.0, |s| {
+            strength * noise.weight(s) * relative_weight / noise.variance_px2
         })
-        .collect();
+    });
     (noise, weights)
 }
 
@@ -165,19 +145,25 @@ pub fn relative_weights(
     observations: &Observations,
     noise: &StudentT,
 ) -> Vec<Vec<f64>> {
-    let relative = |residual: &Option<Vector2<f64>>, relative_weight: f64| {
+    per_corner(residuals, observations, |residual, relative_weight| {
         let squared = residual.map(|r| r.norm_squared() * relative_weight);
         // The largest weight of the distribution is (nu + 2) / nu, at zero.
         squared.map_or(0.0, |s| noise.weight(s) / noise.weight(0.0))
-    };
-    residuals
-        .iter()
-        .zip(&observations.views)
-        .map(|(residuals, view)| {
-            residuals
-                .iter()
-                .zip(&view.corners)
-                .map(|(residual, corner)| relative(residual, corner.relative_weight))
+    })
+}
+
+/// A value of every corner from another and the corner's relative weight, view by view.
+fn per_corner<A, B>(
+    values: &[Vec<A>],
+    observations: &Observations,
+    of: impl Fn(&A, f64) -> B,
+) -> Vec<Vec<B>> {
+    let views = values.iter().zip(&observations.views);
+    views
+        .map(|(values, view)| {
+            let corners = values.iter().zip(&view.corners);
+            corners
+                .map(|(value, corner)| of(value, corner.relative_weight))
                 .collect()
         })
         .collect()

@@ -3,8 +3,10 @@
 
 use super::levenberg::{Settings, minimize};
 use super::model::{CameraModel, Model, Step};
-use super::normal_equations::{CameraPriors, NormalEquations, Priors, Weights, residuals};
+use super::normal_equations::NormalEquations;
+use super::objective::{Weights, residuals};
 use super::observations::{Observations, ObservedCorner, ViewBlock};
+use super::priors::{CameraPriors, Priors};
 use super::residual::linearize;
 use crate::board::{BoardShape, BoardSpec};
 use crate::field::spline::{Spline, SplineGrid};

@@ -102,15 +102,19 @@ pub fn control_points(
         .collect()
 }
 
-/// Whether points support a line: their standard deviation along it is at least
-/// [`MIN_DEPTH_SHARE`] of their distance from the camera.
-pub fn is_supported(points: &[Vector3<f64>], line: &Ray, place_mm: &Vector3<f64>) -> bool {
+/// The line of points (15, 16), if they support one: at least [`MIN_BOARDS`] of them, with a standard
+/// deviation along it of [`MIN_DEPTH_SHARE`] of their distance from the camera.
+pub fn supported_line(points: &[Vector3<f64>], place_mm: &Vector3<f64>) -> Option<Ray> {
+    if points.len() < MIN_BOARDS {
+        return None;
+    }
+    let line = fit_line(points)?;
     let squared: f64 = points
         .iter()
         .map(|point| (point - line.origin_mm).dot(&line.direction).powi(2))
         .sum();
     let deviation = (squared / points.len() as f64).sqrt();
-    deviation >= MIN_DEPTH_SHARE * (line.origin_mm - place_mm).norm()
+    (deviation >= MIN_DEPTH_SHARE * (line.origin_mm - place_mm).norm()).then_some(line)
 }
 
 /// Alternates. The boards' poses are common to all `cameras`: each is pulled by the rays of all that
@@ -124,7 +128,7 @@ pub fn alternate(
     datum: usize,
     settings: &AlternationSettings,
 ) -> Alternated {
-    let chart = Chart::new(start, datum);
+    let chart = Chart { start, datum };
     let mut mixing = Mixing::new(settings.mixing);
     let mut poses = start.to_vec();
     let (mut feet, mut rms) = pulls(cameras, &poses);
@@ -201,13 +205,9 @@ struct Chart<'a> {
     datum: usize,
 }
 
-impl<'a> Chart<'a> {
+impl Chart<'_> {
     /// What makes a turn comparable with a shift: about the reach of a board from its middle.
     const ARM_MM: f64 = 100.0;
-
-    fn new(start: &'a [Option<RigidTransform>], datum: usize) -> Self {
-        Self { start, datum }
-    }
 
     /// The poses that move, with their starts.
     fn moving(&self) -> impl Iterator<Item = (usize, &RigidTransform)> {
@@ -279,11 +279,7 @@ fn feet_of(
 ) -> Vec<(usize, Pull)> {
     let controls = control_points(control, poses);
     let points: Vec<Vector3<f64>> = controls.iter().map(|(_, _, point)| *point).collect();
-    if points.len() < MIN_BOARDS {
-        return Vec::new();
-    }
-    let line = fit_line(&points).filter(|line| is_supported(&points, line, place_mm));
-    let Some(line) = line else {
+    let Some(line) = supported_line(&points, place_mm) else {
         return Vec::new();
     };
     controls

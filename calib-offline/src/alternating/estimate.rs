@@ -132,7 +132,7 @@ pub enum AlternatingError {
     #[error(
         "no view has the {} corners that a network needs to be trained and tested; the published \
          procedure maps each view by itself and cannot use smaller ones",
-        super::plane_map::MIN_CORNERS * 5 / 4 + 1
+        super::spread::MIN_TESTED_CORNERS
     )]
     FewCorners,
     /// The start asked for does not exist.
@@ -182,10 +182,12 @@ pub fn estimate(
     // (3) to (5), (31), (32)
     let mut tried = Vec::new();
     let wanted = |start: &Start| settings.start.is_none_or(|kind| start.kind == kind);
-    for start in starts(observations, own, settings.mean)
-        .into_iter()
-        .filter(wanted)
-    {
+    let mut all = starts(observations, own, settings.mean);
+    all.retain(wanted);
+    if all.is_empty() {
+        return Err(AlternatingError::NoStart);
+    }
+    for start in all {
         let controls = controls(observations, &maps, &start.rig_from_camera, settings);
         if let Some(rms_mm) = rms_mm(&controls, &start.rig_from_board) {
             tried.push((

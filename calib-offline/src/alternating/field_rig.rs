@@ -7,7 +7,7 @@ use super::AlternatingEstimate;
 use super::rays::SupportedRay;
 use crate::field::from_rays::{FromRaysSettings, SampledRay, field_of_rays, ray_error_px};
 use crate::field::{BaseLens, CalibratedCamera, CoverageMask, Rig};
-use crate::geometry::{RigidTransform, SensorSize};
+use crate::geometry::{RigidTransform, SensorSize, rms};
 
 /// Rays along the longer side of the sensor: two in each cell of the mask along each axis.
 const RAYS_ALONG_LONGER_SIDE: f64 = 96.0;
@@ -62,8 +62,7 @@ impl AlternatingEstimate {
                 .filter(|ray| coverage.contains(ray.pixel))
                 .filter_map(|ray| ray_error_px(&field, ray))
                 .collect();
-            let squared: f64 = errors.iter().map(|e| e * e).sum();
-            rms_error_px.push((squared / errors.len().max(1) as f64).sqrt());
+            rms_error_px.push(rms(&errors).unwrap_or(0.0));
             cameras.push(CalibratedCamera {
                 name: names.get(camera_idx)?.clone(),
                 field,

@@ -1,7 +1,6 @@
 //! The rays of one camera: from control points to a table with one ray per pixel.
 
-use super::alternation::{MIN_BOARDS, PixelControl, control_points};
-use super::line_fit::fit_line;
+use super::alternation::{PixelControl, control_points, supported_line};
 use super::plane_map::PlaneMap;
 use crate::field::RayTable;
 use crate::geometry::{PixelPoint, Ray, RigidTransform, SensorSize};
@@ -39,18 +38,15 @@ impl RaySource {
         control(&self.maps, pixel)
     }
 
-    /// The ray of a pixel, anywhere between pixels too; `None` if fewer than [`MIN_BOARDS`] boards
-    /// or boards in one depth support it.
+    /// The ray of a pixel, anywhere between pixels too; `None` where [`supported_line`] finds
+    /// none.
     pub fn ray(&self, pixel: PixelPoint) -> Option<SupportedRay> {
         let control = self.control(pixel);
         let points: Vec<Vector3<f64>> = control_points(&control, &self.rig_from_board)
             .into_iter()
             .map(|(_, _, point)| point)
             .collect();
-        if points.len() < MIN_BOARDS {
-            return None;
-        }
-        let line = fit_line(&points)?;
+        let line = supported_line(&points, &self.place_mm)?;
         let forward = (line.origin_mm - self.place_mm).dot(&line.direction);
         let direction = line.direction * 1f64.copysign(forward);
         let origin_mm = line.foot_point(&self.place_mm);
@@ -69,7 +65,6 @@ impl RaySource {
             near_mm,
             far_mm,
         })
-        .filter(|_| super::alternation::is_supported(&points, &line, &self.place_mm))
     }
 
     /// The rays of a lattice over the sensor, `spacing_px` apart, row by row.

@@ -9,11 +9,15 @@
 
 use super::plane_map::{MIN_CORNERS, NetworkSettings, TrainingSet, errors_mm};
 use crate::adjust::observations::{ObservedCorner, ViewBlock};
+use crate::geometry::rms;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// One corner in so many is left out.
 const FOLDS: usize = 5;
+/// Fewest corners of a view whose network can be tested: without a fold of them [`MIN_CORNERS`] are
+/// left.
+pub const MIN_TESTED_CORNERS: usize = (MIN_CORNERS * FOLDS).div_ceil(FOLDS - 1);
 /// Candidates of [`choose`]: spreads as shares of the median distance of a corner from the middle of
 /// its board's image, from neighbors to the flat limit.
 const SHARES: [f64; 17] = [
@@ -106,7 +110,7 @@ struct PreparedView {
 impl PreparedView {
     fn new(corners: &[ObservedCorner], settings: &NetworkSettings) -> Option<Self> {
         // Folds must train as well.
-        if corners.len() * (FOLDS - 1) / FOLDS < MIN_CORNERS {
+        if corners.len() < MIN_TESTED_CORNERS {
             return None;
         }
         let is_inner = |corner: &ObservedCorner| {
@@ -148,10 +152,6 @@ fn error_at(views: &[PreparedView], spread_px: f64) -> Option<SpreadError> {
             left_out.extend(errors_mm(&set.train(spread_px)?, scored));
         }
     }
-    let rms = |errors: &[f64]| {
-        (!errors.is_empty())
-            .then(|| (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt())
-    };
     Some(SpreadError {
         spread_px,
         training_rms_mm: rms(&training)?,

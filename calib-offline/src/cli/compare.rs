@@ -20,9 +20,9 @@ Example:
 const FORMATS: &str = "\
 DATASET is a folder with dataset.toml and corners.csv or images, as for calibrate. Every method is
 given the same views (those that the joint estimate finds to agree with each other) and the same
-folds: pinhole (Brown-Conrady distortion, robust, all cameras together) and joint (the ray field of
-calibrate). Held-out figures are from the corners that every method can answer, without those that
-every method rejects when it sees them.
+folds: baseline (a pinhole with Brown-Conrady distortion, robust, all cameras together), alternating
+(the published procedure) and joint (the ray field of calibrate). Held-out figures are from the
+corners that every method can answer, without those that every method rejects when it sees them.
 
   fitted px    RMS residual of the corners that all methods use, from the calibration of all poses
   held-out px  RMS residual on boards that the method never saw, pose refitted; then the median

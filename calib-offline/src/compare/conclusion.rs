@@ -211,7 +211,7 @@ fn truth(comparison: &Comparison) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::compare::words::tests::example;
+    use crate::compare::example::example;
 
     fn with_ratio(ratio: f64, low: f64, high: f64) -> String {
         let mut comparison = example();

@@ -56,6 +56,19 @@ impl Shared {
             },
         }
     }
+
+    /// The joint estimate.
+    ///
+    /// # Errors
+    /// [`Failure`] with why there is none.
+    pub fn joint(&self) -> Result<&Estimate, Failure> {
+        self.joint.as_ref().map_err(|error| Failure(chain(error)))
+    }
+
+    /// Stage placement of a pose.
+    pub fn placement(&self, pose: usize) -> Option<usize> {
+        self.placements.get(&pose).copied()
+    }
 }
 
 /// What a method made of all that it was given.
@@ -94,11 +107,11 @@ pub struct Failure(pub String);
 /// The methods, in the order of the table. The first is what the others are measured against.
 pub const CONTENDERS: [Contender; 3] = [
     Contender {
-        name: "pinhole",
+        name: "baseline",
         title: "pinhole, Brown-Conrady",
-        fit: |shared, names| fit_pinhole(&shared.observations, names),
+        fit: |shared, names| fit_baseline(&shared.observations, names),
         fold: |_, training| {
-            let fitted = fit_pinhole(training, &training.numbered_cameras())?;
+            let fitted = fit_baseline(training, &training.numbered_cameras())?;
             Ok(Estimated {
                 rig: fitted.rig,
                 board_shape: fitted.board_shape,
@@ -110,7 +123,7 @@ pub const CONTENDERS: [Contender; 3] = [
         title: "rays one by one, alternating",
         fit: fit_alternating,
         fold: |shared, training| {
-            estimate_alternating(training, &|pose| shared.placements.get(&pose).copied())
+            estimate_alternating(training, &|pose| shared.placement(pose))
                 .map_err(|error| Failure(error.to_string()))
         },
     },
@@ -123,7 +136,7 @@ pub const CONTENDERS: [Contender; 3] = [
 ];
 
 /// The baseline. Its residuals count as the joint estimate's do, so that outliers decide for nobody.
-fn fit_pinhole(observations: &Observations, names: &[String]) -> Result<Fitted, Failure> {
+fn fit_baseline(observations: &Observations, names: &[String]) -> Result<Fitted, Failure> {
     let failure = |error: PinholeError| Failure(error.to_string());
     let settings = RigSettings {
         adjustment: Settings {
@@ -146,9 +159,8 @@ fn fit_pinhole(observations: &Observations, names: &[String]) -> Result<Fitted, 
 /// The published procedure. Corners count as used where the joint estimate's weights would keep them.
 fn fit_alternating(shared: &Shared, names: &[String]) -> Result<Fitted, Failure> {
     let start = start_rig(&shared.observations).map_err(|error| Failure(error.to_string()))?;
-    let placement = |pose| shared.placements.get(&pose).copied();
-    let (found, fields) =
-        estimate_rig(&start, names, &placement).map_err(|error| Failure(error.to_string()))?;
+    let (found, fields) = estimate_rig(&start, names, &|pose| shared.placement(pose))
+        .map_err(|error| Failure(error.to_string()))?;
     let placed = found.poses_by_number();
     let rig_from_board: Vec<Option<RigidTransform>> = shared
         .observations
@@ -199,10 +211,7 @@ fn used_corners(
 }
 
 fn fit_joint(shared: &Shared, names: &[String]) -> Result<Fitted, Failure> {
-    let estimate = shared
-        .joint
-        .as_ref()
-        .map_err(|error| Failure(chain(error)))?;
+    let estimate = shared.joint()?;
     let is_used = estimate.robust_weights.iter();
     Ok(Fitted {
         rig: estimate.rig(names),

@@ -5,6 +5,8 @@ pub mod boards;
 pub mod bootstrap;
 pub mod conclusion;
 pub mod contender;
+#[cfg(test)]
+mod example;
 mod figures;
 pub mod record;
 pub mod words;
@@ -12,9 +14,8 @@ pub mod words;
 pub use record::{Comparison, MethodFigures, SCHEMA};
 
 use crate::adjust::Observations;
-use crate::dataset::corners::poses;
 use crate::dataset::identity::input_sha256;
-use crate::dataset::{Dataset, View, stage};
+use crate::dataset::{Dataset, stage};
 use crate::error::Error;
 use crate::evaluate::{Folds, estimate_folds};
 use crate::matches::read_known;
@@ -23,7 +24,6 @@ use crate::pipeline::{Corners, Method, camera_names, explained, offered};
 use crate::progress::Progress;
 use contender::{CONTENDERS, Contender, Failure, Fitted, Shared};
 use figures::{add_held_out, add_training, add_truth, without_outliers, working_distance_mm};
-use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 /// A method and what came of it.
@@ -71,7 +71,10 @@ pub fn compare_methods(
     };
     progress.begin("screening", 0);
     let began = Instant::now();
-    let shared = Shared::of(&offered.observations, placements(dataset, &corners.views));
+    let shared = Shared::of(
+        &offered.observations,
+        stage::placements(dataset, &corners.views),
+    );
     let joint_time = began.elapsed();
     progress.end();
     let observations = &shared.observations;
@@ -160,12 +163,4 @@ fn empty_row(run: &Run) -> MethodFigures {
         truth: Vec::new(),
         time: run.time,
     }
-}
-
-/// Stage placement of the poses that belong to one.
-fn placements(dataset: &Dataset, views: &[View]) -> BTreeMap<usize, usize> {
-    let all = poses(views);
-    all.iter()
-        .filter_map(|pose| Some((*pose, stage::entry(dataset, &all, *pose).placement?)))
-        .collect()
 }

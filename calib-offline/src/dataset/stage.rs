@@ -7,7 +7,7 @@
 
 use super::corners::{CornersError, poses};
 use super::{Dataset, View};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What the stage says of one pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -62,6 +62,14 @@ pub fn entry(dataset: &Dataset, poses: &BTreeSet<usize>, pose: usize) -> StageEn
         angle_deg,
         placement,
     }
+}
+
+/// Placement of the poses that belong to one, of all poses in `views` (all views of the dataset).
+pub fn placements(dataset: &Dataset, views: &[View]) -> BTreeMap<usize, usize> {
+    let all = poses(views);
+    all.iter()
+        .filter_map(|pose| Some((*pose, entry(dataset, &all, *pose).placement?)))
+        .collect()
 }
 
 /// Refuses lists that fit the poses of the corners neither by number nor by order.

@@ -3,8 +3,9 @@
 use super::DemoError;
 use crate::adjust::Observations;
 use crate::error::Error;
+use crate::evaluate::Folds;
 use crate::evaluate::held_out::{BoardErrors, Fold, measure_boards};
-use crate::evaluate::{Folds, rms};
+use crate::geometry::rms;
 use crate::in_order;
 use crate::matches::source::BlobSource;
 use crate::pack::{AlignedBytes, PackSettings, pack_nearest};

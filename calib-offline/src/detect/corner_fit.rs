@@ -8,9 +8,10 @@
 //! crossing. On the `opencv-stereo` images this lowers the held-out error of the distances between
 //! neighboring corners from 0.67 % (`cornerSubPix`) and 0.66 % (quadratic saddle fit) to 0.40 %.
 
+use super::edge_fit::{Fitted, Limits, NormalEquations, fit};
 use crate::dataset::image::GrayImage;
 use crate::geometry::PixelPoint;
-use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+use nalgebra::{Matrix2, SVector, Vector2};
 use std::f64::consts::{FRAC_2_SQRT_PI, SQRT_2};
 
 /// Half the side of the window, as a fraction of the squares around the corner: the window ends
@@ -20,10 +21,13 @@ const HALF_WINDOW_SQUARES: f64 = 0.5;
 const MIN_PIXELS: usize = 25;
 /// The window follows the corner: fitted twice, the second time around the first result.
 const ROUNDS: usize = 2;
-const MAX_ITERATIONS: usize = 40;
-/// A step below this many pixels (radians, for the directions) ends the iteration; convergence is
+/// A step below so many pixels (radians, for the directions) ends the iteration; convergence is
 /// quadratic, so that the error left is far smaller.
-const STEP_TOLERANCE: f64 = 1e-4;
+const LIMITS: Limits = Limits {
+    iterations: 40,
+    step: 1e-4,
+    placing: 4,
+};
 /// Beyond this many standard deviations of the blur an edge is flat to 1e-6.
 const FLAT_BEYOND: f64 = 5.0;
 /// Blur is kept between these bounds while iterating, px. The lower one is well below the blur of
@@ -31,7 +35,6 @@ const FLAT_BEYOND: f64 = 5.0;
 const BLUR_RANGE_PX: (f64, f64) = (0.1, 40.0);
 
 type Parameters = SVector<f64, 7>;
-type Normal = SMatrix<f64, 7, 7>;
 
 /// What the fit needs to know beforehand.
 #[derive(Debug, Clone, Copy)]
@@ -81,14 +84,20 @@ pub fn fit_corner(
             Some(model) => model,
             None => EdgeModel::start(guess, &window)?,
         };
-        let solved = solve(start, &window)?;
-        if solved.0.pixel().distance_px(center) > window.radius_px {
+        let solved = window.solve(start)?;
+        let fitted = EdgeModel(solved.unknowns);
+        if fitted.pixel().distance_px(center) > window.radius_px {
             return None;
         }
-        model = Some(solved.0);
+        model = Some(fitted);
         outcome = Some(solved);
     }
-    let (model, covariance, residual_rms) = outcome?;
+    let Fitted {
+        unknowns,
+        covariance,
+        residual_rms,
+    } = outcome?;
+    let model = EdgeModel(unknowns);
     let variance = f64::midpoint(covariance[(0, 0)], covariance[(1, 1)]);
     let fitted = FittedCorner {
         pixel: model.pixel(),
@@ -264,60 +273,19 @@ impl Window {
         self.pixels.iter().map(squared).sum()
     }
 
-    fn normal_equations(&self, model: &EdgeModel) -> NormalEquations {
-        let edges = model.edges();
-        let (mut normal, mut right) = (Normal::zeros(), Parameters::zeros());
-        let mut cost = 0.0;
-        for &(u, v, value) in &self.pixels {
-            let (predicted, gradient) = edges.value_and_gradient(u, v);
-            let residual = value - predicted;
-            normal.ger(1.0, &gradient, &gradient, 1.0);
-            right.axpy(residual, &gradient, 1.0);
-            cost += residual * residual;
-        }
-        NormalEquations {
-            normal,
-            right,
-            cost,
-        }
+    /// `None` where the equations determine no model.
+    fn solve(&self, start: EdgeModel) -> Option<Fitted<7>> {
+        let keep_in_range = |unknowns: &mut Parameters| {
+            unknowns[BLUR] = unknowns[BLUR].clamp(BLUR_RANGE_PX.0, BLUR_RANGE_PX.1);
+        };
+        fit(start.0, &LIMITS, keep_in_range, |unknowns| {
+            let edges = EdgeModel(*unknowns).edges();
+            let pixels = self.pixels.iter();
+            Some(NormalEquations::of(pixels.map(|&(u, v, value)| {
+                (value, edges.value_and_gradient(u, v))
+            })))
+        })
     }
-}
-
-struct NormalEquations {
-    normal: Normal,
-    right: Parameters,
-    cost: f64,
-}
-
-/// Levenberg-Marquardt: the model, its covariance from the residuals' own variance, their RMS.
-fn solve(start: EdgeModel, window: &Window) -> Option<(EdgeModel, Normal, f64)> {
-    let mut model = start;
-    let mut at = window.normal_equations(&model);
-    let mut damping = 1e-3;
-    for _ in 0..MAX_ITERATIONS {
-        let mut damped = at.normal;
-        for k in 0..7 {
-            damped[(k, k)] *= 1.0 + damping;
-        }
-        let step = damped.cholesky()?.solve(&at.right);
-        let mut next = EdgeModel(model.0 + step);
-        next.0[BLUR] = next.0[BLUR].clamp(BLUR_RANGE_PX.0, BLUR_RANGE_PX.1);
-        let at_next = window.normal_equations(&next);
-        if at_next.cost <= at.cost {
-            (model, at) = (next, at_next);
-            damping = (damping * 0.1).max(1e-9);
-        } else {
-            damping *= 10.0;
-        }
-        // A short step ends it whether or not it still improves the fit.
-        if step.fixed_rows::<4>(0).amax() < STEP_TOLERANCE {
-            break;
-        }
-    }
-    let count = window.pixels.len();
-    let variance = at.cost / (count as f64 - 7.0);
-    let covariance = at.normal.cholesky()?.inverse() * variance;
-    Some((model, covariance, (at.cost / count as f64).sqrt()))
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ pub mod border;
 pub mod chessboard;
 pub mod consistency;
 pub mod corner_fit;
+mod edge_fit;
 pub mod epipolar;
 pub mod grid;
 pub mod labelling;

@@ -28,12 +28,22 @@ pub struct TruePoint {
 }
 
 impl TruePoint {
+    /// Where it is.
+    pub fn true_mm(&self) -> Vector3<f64> {
+        Vector3::new(self.x, self.y, self.z)
+    }
+
+    /// See [`PointWithTruth::oracle_mm`].
+    pub fn oracle_mm(&self) -> Vector3<f64> {
+        Vector3::new(self.x_oracle, self.y_oracle, self.z_oracle)
+    }
+
     /// With what was measured of it.
     pub fn with(&self, measured_mm: Vector3<f64>) -> PointWithTruth {
         PointWithTruth {
             measured_mm,
-            true_mm: Vector3::new(self.x, self.y, self.z),
-            oracle_mm: Vector3::new(self.x_oracle, self.y_oracle, self.z_oracle),
+            true_mm: self.true_mm(),
+            oracle_mm: self.oracle_mm(),
         }
     }
 }

@@ -301,7 +301,7 @@ fn distance_panels(
             title: "Target: distances of neighboring markers".to_owned(),
             x: x(),
             y: Axis::linear("RMS error of a pose, mm"),
-            series: by_method(|p| Some(p.neighbor_rms_mm)),
+            series: by_method(|p| p.neighbor_rms_mm),
             marks: Vec::new(),
         });
         if target.methods.iter().any(|m| m.true_rms_mm.is_some()) {

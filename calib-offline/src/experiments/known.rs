@@ -1,21 +1,16 @@
 //! Points whose truth is known: absolute error against the distance. Only simulated datasets have them.
 
-use super::ExperimentError;
 use super::methods::{Method, MethodRun};
-use super::statistics::rms;
 use super::target::{measure_all, middle};
 use crate::dataset::Dataset;
 use crate::error::Error;
-use crate::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
-use crate::geometry::{PixelPoint, best_placement};
-use crate::matches::read_matches;
+use crate::evaluate::truth::{PointWithTruth, TruePoint, TruthErrors, compare_with_truth};
+use crate::geometry::{PixelPoint, best_placement, rms};
+use crate::matches::read_known;
+use crate::pipeline::camera_names;
 use nalgebra::Vector3;
-use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
-use std::path::Path;
+use serde::Serialize;
 
-/// Files of matches, each with `NAME_truth.csv` beside it.
-const FILES: [&str; 2] = ["matches", "holdout"];
 /// Bins of the distance, each with as many points as the others.
 const BINS: usize = 12;
 
@@ -58,17 +53,6 @@ pub struct KnownExperiment {
     pub oracle: Vec<Bin>,
 }
 
-/// A row of a table of true points; its other columns are for other uses.
-#[derive(Debug, Deserialize)]
-struct TrueRow {
-    x: f64,
-    y: f64,
-    z: f64,
-    x_oracle: f64,
-    y_oracle: f64,
-    z_oracle: f64,
-}
-
 /// Measures the matches of a dataset that have their truth beside them.
 ///
 /// The outer error ends the command; the inner one, in words, leaves the experiment out.
@@ -79,63 +63,40 @@ pub fn run(
     dataset: &Dataset,
     runs: &[MethodRun],
 ) -> Result<Result<KnownExperiment, String>, Error> {
-    let names: Vec<String> = dataset.cameras.iter().map(|c| c.name.clone()).collect();
-    let (mut items, mut rows) = (Vec::new(), Vec::new());
-    for name in FILES {
-        let file = dataset.folder.join(format!("{name}.csv"));
-        let truth_file = dataset.folder.join(format!("{name}_truth.csv"));
-        if !(file.exists() && truth_file.exists()) {
-            continue;
-        }
-        let matches = read_matches::<f64>(&file, &names)?;
-        let truth: Vec<TrueRow> = read_rows(&truth_file)?;
-        if truth.len() != matches.len() {
-            return Err(Error::Experiment(ExperimentError::Truth {
-                file: truth_file,
-                problem: format!("{} rows, its matches have {}", truth.len(), matches.len()),
-            }));
-        }
-        for (sightings, row) in matches.iter().zip(truth) {
+    let (mut items, mut truth) = (Vec::new(), Vec::new());
+    for known in read_known::<f64>(&dataset.folder, &camera_names(dataset))? {
+        for sightings in &known.matches {
             let pixels = sightings
                 .iter()
                 .map(|&(camera_idx, [u, v])| (camera_idx, PixelPoint::new(u, v)));
             items.push(pixels.collect::<Vec<_>>());
-            rows.push(row);
         }
+        truth.extend(known.truth);
     }
     if items.is_empty() {
         return Ok(Err(
             "the dataset has no matches.csv or holdout.csv with their truth".to_owned(),
         ));
     }
-    Ok(Ok(experiment(runs, &items, &rows)))
+    Ok(Ok(experiment(runs, &items, &truth)))
 }
 
 fn experiment(
     runs: &[MethodRun],
     items: &[Vec<(usize, PixelPoint)>],
-    rows: &[TrueRow],
+    truth: &[TruePoint],
 ) -> KnownExperiment {
     let measured = measure_all(runs, items);
     let common: Vec<usize> = (0..items.len())
         .filter(|k| measured.is_common[*k])
         .collect();
-    let truth = |k: &usize| Vector3::new(rows[*k].x, rows[*k].y, rows[*k].z);
-    let oracle = |k: &usize| Vector3::new(rows[*k].x_oracle, rows[*k].y_oracle, rows[*k].z_oracle);
-    let true_mm: Vec<Vector3<f64>> = common.iter().map(truth).collect();
     let mut middles = Vec::new();
     let mut methods = Vec::new();
     for (method, calibrated, points) in &measured.methods {
         // A method that does not decide which points are common may lack some of them.
         let paired: Vec<PointWithTruth> = common
             .iter()
-            .filter_map(|k| {
-                Some(PointWithTruth {
-                    measured_mm: points[*k]?,
-                    true_mm: truth(k),
-                    oracle_mm: oracle(k),
-                })
-            })
+            .filter_map(|k| Some(truth[*k].with(points[*k]?)))
             .collect();
         let from: Vec<Vector3<f64>> = paired.iter().map(|p| p.measured_mm).collect();
         let to: Vec<Vector3<f64>> = paired.iter().map(|p| p.true_mm).collect();
@@ -160,10 +121,10 @@ fn experiment(
         });
     }
     let cameras = middle(&middles);
-    let limit = common
-        .iter()
-        .zip(&true_mm)
-        .map(|(k, at)| ((at - cameras).norm(), (oracle(k) - at).norm()));
+    let limit = common.iter().map(|k| {
+        let (at, oracle) = (truth[*k].true_mm(), truth[*k].oracle_mm());
+        ((at - cameras).norm(), (oracle - at).norm())
+    });
     KnownExperiment {
         matches: items.len(),
         common: common.len(),
@@ -180,26 +141,13 @@ fn bins(mut pairs: Vec<(f64, f64)>) -> Vec<Bin> {
     let size = pairs.len().div_ceil(BINS).max(1);
     pairs
         .chunks(size)
-        .map(|chunk| {
+        .filter_map(|chunk| {
             let errors: Vec<f64> = chunk.iter().map(|(_, error)| *error).collect();
-            Bin {
+            Some(Bin {
                 distance_mm: chunk.iter().map(|(d, _)| d).sum::<f64>() / chunk.len() as f64,
                 points: chunk.len(),
-                placed_rms_mm: rms(&errors),
-            }
+                placed_rms_mm: rms(&errors)?,
+            })
         })
         .collect()
-}
-
-/// The rows of a table of truth.
-pub(super) fn read_rows<T: DeserializeOwned>(file: &Path) -> Result<Vec<T>, ExperimentError> {
-    let wrong = |error: csv::Error| ExperimentError::Truth {
-        file: file.to_owned(),
-        problem: error.to_string(),
-    };
-    let mut reader = csv::Reader::from_path(file).map_err(wrong)?;
-    reader
-        .deserialize()
-        .collect::<Result<_, _>>()
-        .map_err(wrong)
 }

@@ -3,11 +3,10 @@
 use super::MethodOutcome;
 use crate::adjust::Observations;
 use crate::alternating::{self, AlternatingEstimate, AlternatingSettings};
-use crate::error::Error;
+use crate::compare::contender::Shared;
 use crate::field::Rig;
 use crate::geometry::{PixelPoint, Ray, RigidTransform, triangulate_pair, triangulate_rays};
-use crate::init::rig::{RigStart, start_rig};
-use crate::joint::estimate_screened;
+use crate::init::rig::start_rig;
 use crate::pinhole::{PinholeRig, RigSettings, calibrate_rig};
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -155,46 +154,15 @@ pub fn calibrated(runs: &[MethodRun]) -> impl Iterator<Item = (Method, &Calibrat
         .filter_map(|run| Some((run.method, run.outcome.as_ref().ok()?)))
 }
 
-/// Screens the corners, runs all methods on what is left, and brings them to one frame. Returns the
-/// corners that they were given.
-///
-/// # Errors
-/// No starting point.
-pub fn run_all(
-    offered: &Observations,
-    names: &[String],
-    placement: &dyn Fn(usize) -> Option<usize>,
-) -> Result<(Observations, Vec<MethodRun>), Error> {
-    let mut start = start_rig(offered)?;
-    let joint = estimate_screened(offered, start.clone());
-    // The joint estimate looks at the views once more; all methods get what it kept.
-    if let Ok((estimate, _)) = &joint
-        && !is_same_data(&estimate.observations, &start.observations)
-    {
-        start = start_rig(&estimate.observations)?;
-    }
-    let observations = start.observations.clone();
-    let joint = joint
-        .map_err(|error| error.to_string())
-        .map(|(estimate, _)| {
-            let rig = estimate.rig(names);
-            let places = rig.cameras.iter().map(|c| c.rig_from_camera.translation_mm);
-            let places = places.collect();
-            let poses = estimate.rig_from_board();
-            let numbers = estimate.observations.poses.iter().copied();
-            Calibrated::new(
-                Box::new(rig),
-                numbers.zip(poses.into_iter().map(Some)),
-                places,
-            )
-        });
+/// Runs all methods on the same screened corners, and brings them to one frame.
+pub fn run_all(shared: &Shared, names: &[String]) -> Vec<MethodRun> {
     let mut runs = vec![
-        run(Method::Baseline, baseline(&observations)),
-        run(Method::Alternating, alternating(&start, placement)),
-        run(Method::Joint, joint),
+        run(Method::Baseline, baseline(&shared.observations)),
+        run(Method::Alternating, alternating(shared)),
+        run(Method::Joint, joint(shared, names)),
     ];
     share_datum(&mut runs);
-    Ok((observations, runs))
+    runs
 }
 
 fn run(method: Method, outcome: Result<Calibrated, String>) -> MethodRun {
@@ -205,10 +173,7 @@ fn run(method: Method, outcome: Result<Calibrated, String>) -> MethodRun {
     }
 }
 
-fn is_same_data(a: &Observations, b: &Observations) -> bool {
-    a.poses == b.poses && a.views.len() == b.views.len() && a.corner_count() == b.corner_count()
-}
-
+/// With least squares, as it is used everywhere; `compare` gives it the joint estimate's robust weights.
 fn baseline(observations: &Observations) -> Result<Calibrated, String> {
     let rig =
         calibrate_rig(observations, &RigSettings::default()).map_err(|error| error.to_string())?;
@@ -219,11 +184,10 @@ fn baseline(observations: &Observations) -> Result<Calibrated, String> {
     Ok(Calibrated::new(Box::new(rig), numbers.zip(poses), places))
 }
 
-fn alternating(
-    start: &RigStart,
-    placement: &dyn Fn(usize) -> Option<usize>,
-) -> Result<Calibrated, String> {
-    let estimate = alternating::estimate(start, placement, &AlternatingSettings::default())
+fn alternating(shared: &Shared) -> Result<Calibrated, String> {
+    let start = start_rig(&shared.observations).map_err(|error| error.to_string())?;
+    let placement = |pose| shared.placement(pose);
+    let estimate = alternating::estimate(&start, &placement, &AlternatingSettings::default())
         .map_err(|error| error.to_string())?;
     let poses = estimate.rig_from_board.clone();
     let places = estimate.rig_from_camera.iter();
@@ -235,6 +199,16 @@ fn alternating(
         spread_px,
         ..calibrated
     })
+}
+
+fn joint(shared: &Shared, names: &[String]) -> Result<Calibrated, String> {
+    let estimate = shared.joint().map_err(|error| error.to_string())?;
+    let rig = estimate.rig(names);
+    let places = rig.cameras.iter().map(|c| c.rig_from_camera.translation_mm);
+    let places = places.collect();
+    let poses = estimate.rig_from_board().into_iter().map(Some);
+    let numbers = estimate.observations.poses.iter().copied();
+    Ok(Calibrated::new(Box::new(rig), numbers.zip(poses), places))
 }
 
 /// Brings all calibrations to the frame of the first pose that all of them placed.

@@ -23,14 +23,13 @@ pub mod tables;
 pub mod target;
 pub mod words;
 
-use crate::adjust::Observations;
+use crate::compare::contender::Shared;
 use crate::dataset::Dataset;
 use crate::dataset::corners::poses;
-use crate::dataset::split::without_excluded;
-use crate::dataset::sufficiency::check_sufficiency;
+use crate::dataset::stage::{entry, placements};
 use crate::detect::DetectSettings;
 use crate::error::Error;
-use crate::pipeline;
+use crate::pipeline::{self, camera_names, explained, offered};
 use crate::progress::Progress;
 use methods::{Method, MethodRun};
 use serde::Serialize;
@@ -108,12 +107,6 @@ pub struct LeftOut {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExperimentError {
-    /// No method has a calibration.
-    #[error("none of the methods finds a calibration; the last: {last}")]
-    NoMethod {
-        /// What the last of them said.
-        last: String,
-    },
     /// A file with the truth of a simulated dataset.
     #[error("{}: is not the truth of this dataset: {problem}", file.display())]
     Truth {
@@ -128,7 +121,6 @@ impl ExperimentError {
     /// What to do about it.
     pub fn remedy(&self) -> String {
         match self {
-            Self::NoMethod { .. } => "look at the corners with calib-offline inspect".to_owned(),
             Self::Truth { .. } => {
                 "simulate the dataset anew, or delete the file: experiments that need it are then left out"
                     .to_owned()
@@ -140,36 +132,33 @@ impl ExperimentError {
 /// Runs all experiments that a dataset allows.
 ///
 /// # Errors
-/// Unusable input; corners that no method can start from; [`ExperimentError`].
+/// Unusable input; the joint estimate's own error if no method has an answer; [`ExperimentError`].
 pub fn evaluate(
     dataset: &Dataset,
     settings: &ExperimentSettings,
     progress: &dyn Progress,
 ) -> Result<Evaluation, Error> {
-    let views = pipeline::corners(dataset, &DetectSettings::default(), progress)?.views;
-    let all_poses = poses(&views);
-    let used = without_excluded(views, &dataset.excluded_poses).used;
-    check_sufficiency(dataset, &used)?;
-    let sensors = dataset.cameras.iter().map(|camera| camera.sensor).collect();
-    let offered = Observations::new(dataset.board, sensors, &used);
-    let names: Vec<String> = dataset.cameras.iter().map(|c| c.name.clone()).collect();
+    let corners = pipeline::corners(dataset, &DetectSettings::default(), progress)?;
+    let offered = offered(dataset, &corners)?;
+    let names = camera_names(dataset);
     let scene = auxiliary::scene(dataset)?;
     let mut left_out = Vec::new();
 
     progress.begin("calibrate with three methods", 0);
-    let stage_entry = |pose| crate::dataset::stage::entry(dataset, &all_poses, pose);
-    let prepared = methods::run_all(&offered, &names, &|pose| stage_entry(pose).placement);
+    let placements = placements(dataset, &corners.views);
+    let shared = Shared::of(&offered.observations, placements);
+    let runs = methods::run_all(&shared, &names);
     progress.end();
-    let (observations, runs) = prepared?;
-    if runs.iter().all(|run| run.outcome.is_err()) {
-        let last = runs.iter().find_map(|run| run.outcome.as_ref().err());
-        let last = last.cloned().unwrap_or_default();
-        return Err(ExperimentError::NoMethod { last }.into());
+    let observations = &shared.observations;
+    if runs.iter().all(|run| run.outcome.is_err())
+        && let Err(error) = shared.joint
+    {
+        return Err(explained(error, dataset, &offered.views));
     }
 
     progress.begin("networks of many spreads", 0);
     let chosen_px = methods::calibrated(&runs).find_map(|(_, calibrated)| calibrated.spread_px);
-    let spread = spread::run(&observations, scene.as_ref(), chosen_px, settings);
+    let spread = spread::run(observations, scene.as_ref(), chosen_px, settings);
     progress.end();
     let spread = noted(&mut left_out, "error against spread", spread);
     if scene.is_none() {
@@ -178,7 +167,8 @@ pub fn evaluate(
             reason: "the dataset has no truth.json that says where they are".to_owned(),
         });
     }
-    let stage = stage::run(&runs, &stage_entry);
+    let all_poses = poses(&corners.views);
+    let stage = stage::run(&runs, &|pose| entry(dataset, &all_poses, pose));
     let stage_angles = noted(&mut left_out, "stage angles", stage);
     let one_camera = "one camera cannot triangulate".to_owned();
     let (target, known_points) = if names.len() < 2 {

@@ -3,13 +3,12 @@
 
 use super::ExperimentSettings;
 use super::auxiliary::{SIDE_MM, seen_markers};
-use super::statistics::rms;
 use crate::adjust::Observations;
 use crate::adjust::observations::ViewBlock;
 use crate::alternating::AlternatingSettings;
 use crate::alternating::plane_map::{NetworkSettings, TrainingSet};
 use crate::alternating::spread::sweep;
-use crate::geometry::PixelPoint;
+use crate::geometry::{PixelPoint, rms};
 use crate::simulate::Scene;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -169,5 +168,5 @@ fn marker_rms_mm(views: &[ViewSides], spread_px: f64) -> Option<f64> {
                 .map(|[a, b]| (network.evaluate(*a) - network.evaluate(*b)).norm() - SIDE_MM),
         );
     }
-    (!errors.is_empty()).then(|| rms(&errors))
+    rms(&errors)
 }

@@ -1,10 +1,9 @@
 //! Angle of each pose about the stage's axis against the dial (publication, Fig. 8).
 
 use super::methods::{Calibrated, Method, MethodRun, calibrated};
-use super::statistics::rms;
 use crate::dataset::stage::StageEntry;
 use crate::evaluate::fit_stage_axes;
-use crate::geometry::{RigidTransform, so3};
+use crate::geometry::{RigidTransform, rms, so3};
 use crate::report::record::PoseRecord;
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -98,9 +97,9 @@ fn angles(
         }
     }
     let errors: Vec<f64> = angles.iter().map(|angle| angle.error_deg).collect();
-    (!angles.is_empty()).then(|| MethodAngles {
+    Some(MethodAngles {
         method,
-        rms_deg: rms(&errors),
+        rms_deg: rms(&errors)?,
         wobble_rms_deg: axes.iter().map(|a| a.wobble_rms_rad.to_degrees()).collect(),
         angles,
     })

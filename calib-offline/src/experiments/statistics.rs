@@ -1,5 +1,6 @@
 //! Mean, spread and size of errors.
 
+use crate::geometry::rms;
 use serde::Serialize;
 
 /// Of errors, mm.
@@ -22,9 +23,7 @@ pub struct ErrorStatistics {
 impl ErrorStatistics {
     /// `None` without errors.
     pub fn of(errors_mm: &[f64]) -> Option<Self> {
-        if errors_mm.is_empty() {
-            return None;
-        }
+        let rms_mm = rms(errors_mm)?;
         let count = errors_mm.len() as f64;
         let mean_mm = errors_mm.iter().sum::<f64>() / count;
         let variance_mm2 = errors_mm.iter().map(|e| (e - mean_mm).powi(2)).sum::<f64>() / count;
@@ -33,15 +32,10 @@ impl ErrorStatistics {
             mean_mm,
             deviation_mm: variance_mm2.sqrt(),
             variance_mm2,
-            rms_mm: rms(errors_mm),
+            rms_mm,
             worst_mm: errors_mm.iter().copied().fold(0.0, f64::max),
         })
     }
-}
-
-/// Root mean square; NaN of nothing.
-pub fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
 
 #[cfg(test)]

@@ -83,18 +83,18 @@ fn distance_table(target: Option<&TargetExperiment>, known: Option<&KnownExperim
     for method in target.iter().flat_map(|t| &t.methods) {
         for pose in &method.poses {
             let errors = &pose.errors;
-            let truth = pose.true_rms_mm.map_or_else(String::new, |v| v.to_string());
+            let [neighbor, truth] = [pose.neighbor_rms_mm, pose.true_rms_mm]
+                .map(|rms_mm| rms_mm.map_or_else(String::new, |v| v.to_string()));
             let _ = writeln!(
                 text,
-                "target,{},{},{},{},{},{},{},{},{truth}",
+                "target,{},{},{},{},{},{},{},{neighbor},{truth}",
                 method.method.name(),
                 pose.pose,
                 pose.distance_mm,
                 errors.count,
                 errors.rms_mm,
                 errors.mean_mm,
-                errors.deviation_mm,
-                pose.neighbor_rms_mm
+                errors.deviation_mm
             );
         }
     }

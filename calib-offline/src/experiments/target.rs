@@ -2,9 +2,8 @@
 //! and 11). Its markers are known to each other, so no truth of the rig is needed.
 
 use super::ExperimentError;
-use super::known::read_rows;
 use super::methods::{Calibrated, Method, MethodRun, Pixels, calibrated};
-use super::statistics::{ErrorStatistics, rms};
+use super::statistics::ErrorStatistics;
 use crate::board::BoardSpec;
 use crate::dataset::{Dataset, TargetSpec};
 use crate::detect::ring_target::{
@@ -12,7 +11,7 @@ use crate::detect::ring_target::{
 };
 use crate::error::Error;
 use crate::evaluate::measured_board::MeasuredBoard;
-use crate::geometry::best_placement;
+use crate::geometry::{best_placement, rms};
 use crate::progress::Progress;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -31,8 +30,8 @@ pub struct TargetPose {
     pub distance_mm: f64,
     /// Distances of the markers from the best-placed nominal target.
     pub errors: ErrorStatistics,
-    /// RMS error of the distances of neighboring markers, mm.
-    pub neighbor_rms_mm: f64,
+    /// RMS error of the distances of neighboring markers, mm; `None` where no two are neighbors.
+    pub neighbor_rms_mm: Option<f64>,
     /// RMS distance of the markers from their true places, after one rigid placement of all poses
     /// together; `None` without truth.
     pub true_rms_mm: Option<f64>,
@@ -269,7 +268,7 @@ fn judge(
         method,
         without_point: 0,
         errors: ErrorStatistics::of(&all),
-        neighbor_rms_mm: (!neighbors.is_empty()).then(|| rms(&neighbors)),
+        neighbor_rms_mm: rms(&neighbors),
         true_rms_mm: None,
         largest_pose_deviation_mm: poses.iter().map(|p| p.errors.deviation_mm).reduce(f64::max),
         poses,
@@ -293,11 +292,16 @@ fn read_truth(file: &Path) -> Result<Truth, ExperimentError> {
     if !file.exists() {
         return Ok(Truth::new());
     }
-    let rows: Vec<TrueMarker> = read_rows(file)?;
-    let places = rows
-        .iter()
-        .map(|row| (row.id, Vector3::new(row.x, row.y, row.z)));
-    Ok(places.collect())
+    let wrong = |error: csv::Error| ExperimentError::Truth {
+        file: file.to_owned(),
+        problem: error.to_string(),
+    };
+    let mut reader = csv::Reader::from_path(file).map_err(wrong)?;
+    reader
+        .deserialize()
+        .map(|row| row.map(|m: TrueMarker| (m.id, Vector3::new(m.x, m.y, m.z))))
+        .collect::<Result<_, _>>()
+        .map_err(wrong)
 }
 
 /// Fills in the errors against the truth, where there is any.
@@ -321,7 +325,7 @@ fn compare_with_truth(
     let of = |keep: &dyn Fn(usize) -> bool| {
         let kept = errors.iter().filter(|(pose, _)| keep(*pose));
         let kept: Vec<f64> = kept.map(|(_, error)| *error).collect();
-        (!kept.is_empty()).then(|| rms(&kept))
+        rms(&kept)
     };
     found.true_rms_mm = of(&|_| true);
     for pose in &mut found.poses {

@@ -8,6 +8,7 @@ pub mod hull;
 pub mod pixel;
 pub mod placement;
 pub mod ray;
+mod rms;
 pub mod se3;
 pub mod so3;
 pub mod triangulation;
@@ -15,6 +16,7 @@ pub mod triangulation;
 pub use pixel::{PixelPoint, SensorSize};
 pub use placement::best_placement;
 pub use ray::Ray;
+pub use rms::rms;
 pub use se3::RigidTransform;
 pub use triangulation::{
     TriangulateError, Triangulation, midpoint_by_shifts, nearest_point, triangulate_pair,

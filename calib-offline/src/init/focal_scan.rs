@@ -4,8 +4,9 @@ use super::bearing_pose::{bearing_pose, is_collinear};
 use super::parallel_rays::affine_median_px;
 use super::{InitError, MIN_CORNERS, MIN_POSES};
 use crate::adjust::levenberg::{self, Settings};
-use crate::adjust::normal_equations::{self, CameraPriors, Priors};
+use crate::adjust::objective;
 use crate::adjust::observations::ViewBlock;
+use crate::adjust::priors::{CameraPriors, Priors};
 use crate::adjust::robust::reweight;
 use crate::adjust::{CameraModel, Model, Observations};
 use crate::board::BoardShape;
@@ -234,11 +235,11 @@ fn adjust_cubic(
         relative_decrease: 1e-6,
     };
     for _ in 0..rounds {
-        let residuals = normal_equations::residuals(&model, observations, &bases);
+        let residuals = objective::residuals(&model, observations, &bases);
         let (_, weights) = reweight(&residuals, observations, 1.0, None);
         model = levenberg::minimize(model, observations, &bases, &weights, &priors, settings).model;
     }
-    let mut lengths_px: Vec<f64> = normal_equations::residuals(&model, observations, &bases)
+    let mut lengths_px: Vec<f64> = objective::residuals(&model, observations, &bases)
         .iter()
         .flatten()
         .map(|residual| residual.map_or(f64::INFINITY, |r| r.norm()))

@@ -5,8 +5,11 @@ use super::estimate::EstimateError;
 use super::evidence::Smoothness;
 use crate::adjust::levenberg::{self, Settings, StopReason};
 use crate::adjust::model::Layout;
-use crate::adjust::normal_equations::{self, NormalEquations, Priors, Reduced, Weights};
+use crate::adjust::normal_equations::NormalEquations;
+use crate::adjust::objective::{self, Weights};
 use crate::adjust::observations::ViewBasis;
+use crate::adjust::priors::Priors;
+use crate::adjust::reduced::Reduced;
 use crate::adjust::robust::{StudentT, reweight};
 use crate::adjust::{Model, Observations};
 use nalgebra::Vector2;
@@ -47,7 +50,7 @@ impl Fit {
     /// A fit that starts at a model, with the smoothness given.
     pub fn new(model: Model, smoothness: Smoothness, observations: &Observations) -> Self {
         let bases = model.view_bases(observations);
-        let residuals = normal_equations::residuals(&model, observations, &bases);
+        let residuals = objective::residuals(&model, observations, &bases);
         Self {
             model,
             smoothness,
@@ -71,7 +74,7 @@ impl Fit {
         change(&mut next.model);
         next.smoothness.cover(&next.model, next.noise.variance_px2);
         next.bases = next.model.changed_view_bases(observations, &self.bases);
-        next.residuals = normal_equations::residuals(&next.model, observations, &next.bases);
+        next.residuals = objective::residuals(&next.model, observations, &next.bases);
         next
     }
 
@@ -144,7 +147,7 @@ impl Fit {
         self.model = outcome.model;
         self.costs = outcome.costs;
         self.stop = outcome.stop;
-        self.residuals = normal_equations::residuals(&self.model, observations, &self.bases);
+        self.residuals = objective::residuals(&self.model, observations, &self.bases);
     }
 
     /// One round: weights, one Gauss-Newton step, and new smoothness weights from the same
@@ -159,9 +162,9 @@ impl Fit {
         let evidence = self.ln_evidence_twice(&reduced, &priors);
         let stepped = self.model.stepped(&layout, &equations.step(&reduced));
         let cost = |model: &Model, residuals: &[Vec<Option<Vector2<f64>>>]| {
-            normal_equations::cost_of_residuals(residuals, model, observations, &weights, &priors)
+            objective::cost_of_residuals(residuals, model, observations, &weights, &priors)
         };
-        let residuals = normal_equations::residuals(&stepped, observations, &self.bases);
+        let residuals = objective::residuals(&stepped, observations, &self.bases);
         if cost(&stepped, &residuals) < cost(&self.model, &self.residuals) {
             self.model = stepped;
             self.residuals = residuals;

@@ -6,7 +6,7 @@ use super::brown::INTRINSICS;
 use super::reprojection::{
     assemble, check_start, columns, cost, residuals, shared_count, stepped, taking_part,
 };
-use crate::adjust::normal_equations::Weights;
+use crate::adjust::objective::Weights;
 use crate::adjust::robust::{StudentT, reweight};
 use crate::adjust::{Observations, StopReason};
 use serde::{Deserialize, Serialize};

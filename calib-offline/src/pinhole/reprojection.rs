@@ -4,7 +4,7 @@ use super::PinholeError;
 use super::arrowhead::{Arrowhead, Step};
 use super::brown::{BrownCamera, INTRINSICS};
 use crate::adjust::Observations;
-use crate::adjust::normal_equations::Weights;
+use crate::adjust::objective::Weights;
 use crate::adjust::observations::ViewBlock;
 use crate::geometry::so3::skew;
 use crate::geometry::{PixelPoint, RigidTransform};

@@ -1,7 +1,7 @@
 //! The published procedure as a method of the pipeline.
 
 use super::Method;
-use super::solution::{Solution, Solved, Task, folds_wanted};
+use super::solution::{FoldError, Solution, Solved, Task, folds_wanted};
 use crate::adjust::Observations;
 use crate::adjust::robust::{relative_weights, reweight};
 use crate::alternating::alternation::{Alternated, AlternationStop};
@@ -12,22 +12,11 @@ use crate::error::Error;
 use crate::evaluate::estimate_folds;
 use crate::evaluate::held_out::Estimated;
 use crate::evaluate::reprojection::residuals;
-use crate::field::BaseLens;
-use crate::init::InitError;
+use crate::field::{BaseLens, Rig};
 use crate::init::rig::{RigStart, start_rig};
 use crate::progress::Progress;
 use crate::report::record::AlternatingRecord;
-
-/// Why some training poses gave no estimate.
-#[derive(Debug, thiserror::Error)]
-pub enum FoldError {
-    /// No start.
-    #[error(transparent)]
-    Start(#[from] InitError),
-    /// No estimate.
-    #[error(transparent)]
-    Estimate(#[from] AlternatingError),
-}
+use nalgebra::Vector2;
 
 /// Screens, runs the published procedure, and checks it without the poses of each fold.
 ///
@@ -52,7 +41,8 @@ pub fn alternating_solution(
         .with_pose_indices(|pose_idx| found.rig_from_board[pose_idx].is_some());
     let rig_from_board: Vec<_> = found.rig_from_board.iter().flatten().copied().collect();
     let board_shape = BoardShape::default();
-    let residuals = residuals(&fields.rig, &rig_from_board, &board_shape, &used);
+    let mut residuals = residuals(&fields.rig, &rig_from_board, &board_shape, &used);
+    drop_outside(&fields.rig, &used, &mut residuals);
     let (noise, _) = reweight(&residuals, &used, 1.0, None);
     let robust_weights = relative_weights(&residuals, &used, &noise);
 
@@ -92,9 +82,10 @@ pub fn alternating_solution(
 pub fn estimate_alternating(
     training: &Observations,
     placement: &dyn Fn(usize) -> Option<usize>,
-) -> Result<Estimated, FoldError> {
+) -> Result<Estimated, FoldError<AlternatingError>> {
     let start = start_rig(training)?;
-    let (_, fields) = estimate_rig(&start, &training.numbered_cameras(), placement)?;
+    let names = training.numbered_cameras();
+    let (_, fields) = estimate_rig(&start, &names, placement).map_err(FoldError::Estimate)?;
     Ok(Estimated {
         rig: fields.rig,
         board_shape: BoardShape::default(),
@@ -116,6 +107,23 @@ pub fn estimate_rig(
         .rig(names, &bases)
         .ok_or(AlternatingError::FewBoards)?;
     Ok((found, fields))
+}
+
+/// Leaves corners outside the calibrated area without a residual: no pixel there has a ray, and what
+/// a smooth field says of it would pass for an outlier.
+fn drop_outside(
+    rig: &Rig,
+    observations: &Observations,
+    residuals: &mut [Vec<Option<Vector2<f64>>>],
+) {
+    for (view, residuals) in observations.views.iter().zip(residuals) {
+        let camera = rig.cameras.get(view.camera_idx);
+        for (corner, residual) in view.corners.iter().zip(residuals) {
+            if !camera.is_some_and(|camera| camera.coverage.contains(corner.pixel)) {
+                *residual = None;
+            }
+        }
+    }
 }
 
 fn stop_reason(alternated: &Alternated) -> String {

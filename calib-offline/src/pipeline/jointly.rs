@@ -1,28 +1,16 @@
 //! The joint estimate as a method of the pipeline.
 
 use super::Method;
-use super::solution::{Solution, Solved, Task, folds_wanted};
+use super::solution::{FoldError, Solution, Solved, Task, folds_wanted};
 use crate::adjust::{Observations, StopReason};
 use crate::error::Error;
 use crate::evaluate::half_data::first_half;
 use crate::evaluate::held_out::Estimated;
 use crate::evaluate::{cross_check, estimate_folds};
-use crate::init::InitError;
 use crate::init::rig::start_rig;
 use crate::joint::{Estimate, EstimateError, estimate, estimate_screened};
 use crate::progress::Progress;
 use crate::report::record::ChoicesRecord;
-
-/// Why some training poses gave no estimate.
-#[derive(Debug, thiserror::Error)]
-pub enum FoldError {
-    /// No start.
-    #[error(transparent)]
-    Start(#[from] InitError),
-    /// No estimate.
-    #[error(transparent)]
-    Estimate(#[from] EstimateError),
-}
 
 /// Screens, estimates, and checks: against itself, and without the poses of each fold.
 ///
@@ -84,9 +72,9 @@ pub fn joint_solution(
 ///
 /// # Errors
 /// [`FoldError`].
-pub fn estimate_joint(training: &Observations) -> Result<Estimated, FoldError> {
+pub fn estimate_joint(training: &Observations) -> Result<Estimated, FoldError<EstimateError>> {
     let start = start_rig(training)?;
-    let estimate = estimate(&start.observations, &start)?;
+    let estimate = estimate(&start.observations, &start).map_err(FoldError::Estimate)?;
     Ok(Estimated {
         rig: estimate.rig(&training.numbered_cameras()),
         board_shape: estimate.model.board_shape,

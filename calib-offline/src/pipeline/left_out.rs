@@ -1,5 +1,6 @@
 //! What did not go into the estimate as it was recorded, and why, for the record.
 
+use super::solution::{Unused, unused};
 use super::summary::Parts;
 use crate::detect::verdict::Outcome;
 use crate::init::screening::{Finding, FindingKind};
@@ -43,23 +44,28 @@ pub fn left_out(parts: &Parts, names: &[String]) -> Vec<LeftOut> {
             });
         }
     }
-    for (view, weights) in solution
-        .observations
-        .views
-        .iter()
-        .zip(&solution.robust_weights)
-    {
-        let rejected = weights.iter().filter(|weight| **weight == 0.0).count();
-        if rejected > 0 {
-            list.push(LeftOut {
-                pose: solution.observations.poses[view.pose_idx],
-                camera: Some(names[view.camera_idx].clone()),
-                corner_count: rejected,
-                reason: format!(
-                    "{rejected} of {} corners rejected as outliers",
-                    weights.len()
-                ),
-            });
+    let views = solution.observations.views.iter();
+    let found = solution.residuals.iter().zip(&solution.robust_weights);
+    for (view, (residuals, weights)) in views.zip(found) {
+        let Unused {
+            rejected,
+            without_ray,
+        } = unused(residuals, weights);
+        for (corner_count, why) in [
+            (rejected, "rejected as outliers"),
+            (
+                without_ray,
+                "cannot be judged: outside the calibrated area, or behind the camera",
+            ),
+        ] {
+            if corner_count > 0 {
+                list.push(LeftOut {
+                    pose: solution.observations.poses[view.pose_idx],
+                    camera: Some(names[view.camera_idx].clone()),
+                    corner_count,
+                    reason: format!("{corner_count} of {} corners {why}", weights.len()),
+                });
+            }
         }
     }
     list.extend(
@@ -137,4 +143,24 @@ pub fn renumbered(findings: &[Finding], names: &[String]) -> Vec<Renumbered> {
             _ => None,
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector2;
+
+    #[test]
+    fn a_corner_without_a_ray_is_no_outlier() {
+        let residual = Some(Vector2::new(3.0, 4.0));
+        let found = unused(
+            &[residual, None, residual, None, None],
+            &[1.0, 0.0, 0.0, 0.0, 0.0],
+        );
+        let expected = Unused {
+            rejected: 1,
+            without_ray: 3,
+        };
+        assert_eq!(found, expected);
+    }
 }

@@ -8,6 +8,7 @@ use crate::dataset::sufficiency::MIN_POSES;
 use crate::evaluate::{CrossChecks, Folds};
 use crate::field::Rig;
 use crate::geometry::RigidTransform;
+use crate::init::InitError;
 use crate::init::screening::Finding;
 use crate::report::record::{AlternatingRecord, ChoicesRecord};
 use nalgebra::Vector2;
@@ -39,7 +40,7 @@ pub struct Solution {
     pub board_shape: BoardShape,
     /// Observed minus predicted, px, per view and corner; `None` where nothing is predicted.
     pub residuals: Vec<Vec<Option<Vector2<f64>>>>,
-    /// Robust weight per view and corner, 0 to 1; 0 is a rejected corner.
+    /// Robust weight per view and corner, 0 to 1; 0 is a corner that is rejected or has no residual.
     pub robust_weights: Vec<Vec<f64>>,
     /// Standard deviation of the corner noise per axis, px.
     pub sigma_px: f64,
@@ -65,6 +66,12 @@ impl Solution {
         self.observations.different_pose_count()
     }
 
+    /// Corners rejected as outliers; one without a residual is none.
+    pub fn rejected_count(&self) -> usize {
+        let views = self.residuals.iter().zip(&self.robust_weights);
+        views.map(|(r, w)| unused(r, w).rejected).sum()
+    }
+
     /// Lengths of the residual vectors of the corners that were not rejected, px.
     pub fn used_residuals_px(&self) -> Vec<f64> {
         self.residuals
@@ -84,6 +91,38 @@ pub struct Solved {
     pub solution: Solution,
     /// For the check on unseen boards.
     pub folds: Folds,
+}
+
+/// Corners of a view that did not count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Unused {
+    /// Rejected as outliers.
+    pub rejected: usize,
+    /// No ray to compare with: outside the calibrated area, or behind the camera.
+    pub without_ray: usize,
+}
+
+/// Tells a view's corners of weight 0 apart.
+pub fn unused(residuals: &[Option<Vector2<f64>>], weights: &[f64]) -> Unused {
+    let without_ray = residuals.iter().filter(|r| r.is_none()).count();
+    let pairs = residuals.iter().zip(weights);
+    Unused {
+        rejected: pairs
+            .filter(|(residual, weight)| residual.is_some() && **weight == 0.0)
+            .count(),
+        without_ray,
+    }
+}
+
+/// Why some training poses gave no estimate; `E` is the method's own error.
+#[derive(Debug, thiserror::Error)]
+pub enum FoldError<E> {
+    /// No start.
+    #[error(transparent)]
+    Start(#[from] InitError),
+    /// No estimate.
+    #[error(transparent)]
+    Estimate(E),
 }
 
 /// So many folds, or none with too few poses to leave some out.

@@ -8,7 +8,8 @@ use crate::dataset::identity::input_sha256;
 use crate::dataset::{Dataset, stage};
 use crate::evaluate::half_data::HalfDataCheck;
 use crate::evaluate::verdict::{Figures, Thresholds, judge};
-use crate::evaluate::{CrossChecks, HeldOut, fit_stage_axes, rms};
+use crate::evaluate::{CrossChecks, HeldOut, fit_stage_axes};
+use crate::geometry::rms;
 use crate::report::record::{
     Calibration, CornerRecord, EstimateRecord, HeldOutRecord, PoseRecord, SCHEMA, StageAxis,
 };
@@ -108,7 +109,7 @@ fn corner_records(solution: &Solution) -> Vec<CornerRecord> {
                 row: corner.row,
                 col: corner.col,
                 observed: corner.pixel,
-                // A corner behind its camera has weight 0 and no residual to speak of.
+                // A corner that no ray predicts has weight 0 and no residual to speak of.
                 residual_px: residual.unwrap_or_else(Vector2::zeros),
                 weight: *weight,
             });
@@ -129,7 +130,7 @@ fn estimate_record(solution: &Solution, corners: &[CornerRecord]) -> EstimateRec
         sigma_px: solution.sigma_px,
         rms_px: rms(&used).unwrap_or(0.0),
         corners_used: used.len(),
-        corners_rejected: corners.len() - used.len(),
+        corners_rejected: solution.rejected_count(),
     }
 }
 

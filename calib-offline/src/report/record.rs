@@ -109,9 +109,10 @@ pub struct CornerRecord {
     pub col: usize,
     /// Where it was seen.
     pub observed: PixelPoint,
-    /// Observed minus predicted, px (to first order, see `joint::residual`).
+    /// Observed minus predicted, px (to first order, see `joint::residual`); zero where no ray
+    /// predicts.
     pub residual_px: Vector2<f64>,
-    /// Robust weight, 0 to 1; 0 is a rejected corner.
+    /// Robust weight, 0 to 1; 0 is a corner that is rejected or that no ray predicts.
     pub weight: f64,
 }
 
@@ -152,7 +153,7 @@ pub struct EstimateRecord {
     pub rms_px: f64,
     /// Corners used.
     pub corners_used: usize,
-    /// Corners rejected as outliers.
+    /// Corners rejected as outliers; those that no ray predicts are in neither number.
     pub corners_rejected: usize,
 }
 

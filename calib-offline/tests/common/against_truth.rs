@@ -4,18 +4,20 @@ use calib_offline::adjust::Observations;
 use calib_offline::board::BoardSpec;
 use calib_offline::dataset::View;
 use calib_offline::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
-use calib_offline::geometry::best_placement;
-use calib_offline::geometry::{RigidTransform, so3};
+use calib_offline::experiments::methods::Measurer;
+use calib_offline::geometry::{PixelPoint, RigidTransform, best_placement, so3};
 use calib_offline::init::rig::start_rig;
 use calib_offline::init::screening::{Finding, FindingKind};
 use calib_offline::joint::{Estimate, estimate_screened};
-use calib_offline::simulate::{CameraOptics, MatchSet, OpticsKind, Scene, SceneSettings};
+use calib_offline::simulate::{
+    CameraOptics, MatchSet, OpticsKind, Scene, SceneSettings, TrueMatch,
+};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Points that each comparison measures.
-const MATCHES: usize = 3000;
+/// Points that each comparison measures, unless it says otherwise.
+pub const MATCHES: usize = 3000;
 /// Of the cameras, as nothing else names them.
 const NAMES: [&str; 2] = ["left", "right"];
 /// Quantiles of a chi-square variable of 3 degrees of freedom at 68 % and 95 %.
@@ -127,9 +129,9 @@ pub fn measure(scene: &Scene, estimate: &Estimate, noisy: bool) -> Measured {
 
 /// Errors of one set of matches with noisy pixels, and the share that was not measured.
 pub fn measure_set(scene: &Scene, estimate: &Estimate, set: MatchSet) -> (TruthErrors, f64) {
-    let (points, outside) = measured_points(scene, estimate, set, true);
-    let share = outside as f64 / (points.len() + outside) as f64;
-    (compare_with_truth(&points).unwrap(), share)
+    let rig = estimate.rig(&NAMES.map(str::to_owned));
+    let (errors, share) = errors_and_share(&rig, &scene.matches(set, MATCHES)).unwrap();
+    (errors, 1.0 - share)
 }
 
 fn measured_points(
@@ -140,20 +142,44 @@ fn measured_points(
 ) -> (Vec<PointWithTruth>, usize) {
     let rig = estimate.rig(&NAMES.map(str::to_owned));
     let matches = scene.matches(set, MATCHES);
-    let points: Vec<PointWithTruth> = matches
+    let pixels: fn(&TrueMatch) -> &[PixelPoint] = if noisy {
+        |m| &m.pixels
+    } else {
+        |m| &m.true_pixels
+    };
+    let points = points_with_truth(&rig, &matches, pixels);
+    let outside = matches.len() - points.len();
+    (points, outside)
+}
+
+/// Points of the matches that can be measured, beside their truth.
+pub fn points_with_truth(
+    measurer: &dyn Measurer,
+    matches: &[TrueMatch],
+    pixels: fn(&TrueMatch) -> &[PixelPoint],
+) -> Vec<PointWithTruth> {
+    matches
         .iter()
         .filter_map(|m| {
-            let pixels = if noisy { &m.pixels } else { &m.true_pixels };
-            let point = rig.triangulate(&[(0, pixels[0]), (1, pixels[1])]).ok()?;
+            let sightings: Vec<_> = pixels(m).iter().copied().enumerate().collect();
             Some(PointWithTruth {
-                measured_mm: point.point_mm,
+                measured_mm: measurer.point(&sightings)?,
                 true_mm: m.point_in_datum,
                 oracle_mm: m.oracle_in_datum,
             })
         })
-        .collect();
-    let outside = matches.len() - points.len();
-    (points, outside)
+        .collect()
+}
+
+/// Errors of matches with noisy pixels, and the share that was measured; `None` if that is nothing
+/// to speak of.
+pub fn errors_and_share(
+    measurer: &dyn Measurer,
+    matches: &[TrueMatch],
+) -> Option<(TruthErrors, f64)> {
+    let points = points_with_truth(measurer, matches, |m| &m.pixels);
+    let share = points.len() as f64 / matches.len() as f64;
+    Some((compare_with_truth(&points)?, share))
 }
 
 /// How often errors lie inside their predicted ellipsoids.

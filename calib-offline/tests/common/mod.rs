@@ -14,6 +14,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 pub mod against_truth;
+pub mod halves;
 
 pub const BOARD: BoardSpec = BoardSpec {
     rows: 6,

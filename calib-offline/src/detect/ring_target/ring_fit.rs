@@ -18,8 +18,9 @@ use super::ring_model::{
     AROUND, BLUR, COUNT, Edge, EdgeOffsets, PRINT, Parameters, RATIO, RingModel,
 };
 use crate::dataset::image::GrayImage;
+use crate::detect::edge_fit::{Fitted, Limits, NormalEquations, fit};
 use crate::geometry::PixelPoint;
-use nalgebra::{Matrix2, SMatrix, Vector2};
+use nalgebra::{Matrix2, Vector2};
 
 /// Only pixels this near to an edge are looked at, px; a blur of a quarter of it needs more.
 const BAND_PX: f64 = 8.0;
@@ -31,9 +32,12 @@ const MIN_PIXELS: usize = 40;
 /// this, px, or is blurred so much that the band was too narrow.
 const SAME_WINDOW_PX: f64 = 0.5;
 const ROUNDS: usize = 2;
-const MAX_ITERATIONS: usize = 30;
-/// A step of all lengths below this many pixels ends the iteration.
-const STEP_TOLERANCE: f64 = 1e-5;
+/// A step of all lengths below so many pixels ends the iteration.
+const LIMITS: Limits = Limits {
+    iterations: 30,
+    step: 1e-5,
+    placing: 5,
+};
 /// Blur is kept between these bounds while iterating, px.
 const BLUR_RANGE_PX: (f64, f64) = (0.1, 20.0);
 /// And the ratio of the radii between these.
@@ -42,8 +46,6 @@ const RATIO_RANGE: (f64, f64) = (0.05, 0.97);
 const MAX_RESIDUAL: f64 = 0.12;
 /// The fit must stay this near to the guess, as a part of its radius.
 const MAX_MOVE: f64 = 0.4;
-
-type Normal = SMatrix<f64, COUNT, COUNT>;
 
 /// A fitted ring.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,9 +101,10 @@ impl FittedRing {
         let mut outcome = None;
         for _ in 0..ROUNDS {
             let window = Window::around(image, &model, offsets, reach)?;
-            let solved = solve(model, offsets, &window)?;
-            let moved = (solved.0.center() - model.center()).norm();
-            model = solved.0;
+            let solved = window.solve(model, offsets)?;
+            let before = model.center();
+            model = RingModel(solved.unknowns);
+            let moved = (model.center() - before).norm();
             if (model.center() - guess.center).norm() > MAX_MOVE * guess.mean_radius_px() {
                 return None;
             }
@@ -110,7 +113,11 @@ impl FittedRing {
                 break;
             }
         }
-        let (model, covariance, residual_rms) = outcome?;
+        let Fitted {
+            covariance,
+            residual_rms,
+            ..
+        } = outcome?;
         let fitted = Self {
             pixel: PixelPoint::new(model.0[0], model.0[1]),
             shape: model.shape(),
@@ -217,74 +224,23 @@ impl Window {
         (pixels.len() >= MIN_PIXELS).then_some(Self { pixels })
     }
 
-    fn normal_equations(
-        &self,
-        model: &RingModel,
-        offsets: &EdgeOffsets,
-    ) -> Option<NormalEquations> {
-        let edges = model.edges(offsets)?;
-        let (mut normal, mut right) = (Normal::zeros(), Parameters::zeros());
-        let mut cost = 0.0;
-        for (at, value) in &self.pixels {
-            let (predicted, gradient) = edges.value_and_gradient(at);
-            let residual = value - predicted;
-            normal.ger(1.0, &gradient, &gradient, 1.0);
-            right.axpy(residual, &gradient, 1.0);
-            cost += residual * residual;
-        }
-        Some(NormalEquations {
-            normal,
-            right,
-            cost,
-        })
+    /// `None` where the equations determine no ring.
+    fn solve(&self, start: RingModel, offsets: &EdgeOffsets) -> Option<Fitted<COUNT>> {
+        let keep_in_range = |unknowns: &mut Parameters| {
+            unknowns[BLUR] = unknowns[BLUR].clamp(BLUR_RANGE_PX.0, BLUR_RANGE_PX.1);
+            unknowns[RATIO] = unknowns[RATIO].clamp(RATIO_RANGE.0, RATIO_RANGE.1);
+        };
+        let fitted = fit(start.0, &LIMITS, keep_in_range, |unknowns| {
+            let edges = RingModel(*unknowns).edges(offsets)?;
+            let pixels = self.pixels.iter();
+            Some(NormalEquations::of(
+                pixels.map(|(at, value)| (*value, edges.value_and_gradient(at))),
+            ))
+        })?;
+        // The shape is kept positive definite: a fit that turned it over found something else.
+        let shape = RingModel(fitted.unknowns).shape();
+        (shape.trace() > 0.0 && shape.determinant() > 0.0).then_some(fitted)
     }
-}
-
-struct NormalEquations {
-    normal: Normal,
-    right: Parameters,
-    cost: f64,
-}
-
-/// Levenberg-Marquardt: the model, its covariance from the residuals' own variance, their RMS.
-fn solve(
-    start: RingModel,
-    offsets: &EdgeOffsets,
-    window: &Window,
-) -> Option<(RingModel, Normal, f64)> {
-    let mut model = start;
-    let mut at = window.normal_equations(&model, offsets)?;
-    let mut damping = 1e-3;
-    for _ in 0..MAX_ITERATIONS {
-        let mut damped = at.normal;
-        for k in 0..COUNT {
-            damped[(k, k)] *= 1.0 + damping;
-        }
-        let step = damped.cholesky()?.solve(&at.right);
-        let mut next = RingModel(model.0 + step);
-        next.0[BLUR] = next.0[BLUR].clamp(BLUR_RANGE_PX.0, BLUR_RANGE_PX.1);
-        next.0[RATIO] = next.0[RATIO].clamp(RATIO_RANGE.0, RATIO_RANGE.1);
-        let at_next = window.normal_equations(&next, offsets)?;
-        if at_next.cost <= at.cost {
-            (model, at) = (next, at_next);
-            damping = (damping * 0.1).max(1e-9);
-        } else {
-            damping *= 10.0;
-        }
-        // A short step ends it whether or not it still improves the fit.
-        if step.fixed_rows::<5>(0).amax() < STEP_TOLERANCE {
-            break;
-        }
-    }
-    // The shape is kept positive definite: a fit that turned it over found something else.
-    let shape = model.shape();
-    if !(shape.trace() > 0.0 && shape.determinant() > 0.0) {
-        return None;
-    }
-    let count = window.pixels.len();
-    let variance = at.cost / (count as f64 - COUNT as f64);
-    let covariance = at.normal.cholesky()?.inverse() * variance;
-    Some((model, covariance, (at.cost / count as f64).sqrt()))
 }
 
 /// The shape of a circle's image: `radius` in the units that `px_from_plane` maps to pixels.
