@@ -8,6 +8,6 @@
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/embedded-env.sh"
 
-embedded_env thumbv7em-none-eabihf thumbv6m-none-eabi || exit 3
+embedded_env thumbv7em-none-eabihf thumbv7em-none-eabi thumbv6m-none-eabi || exit 3
 cd "$repository/firmware-sim/cortex-m"
 exec "$EMBEDDED_CARGO" "$@"

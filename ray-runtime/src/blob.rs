@@ -301,14 +301,14 @@ impl<'a> RayBlob<'a> {
         })
     }
 
-    const fn views(&self) -> Views<'a> {
+    pub(crate) const fn views(&self) -> Views<'a> {
         Views {
             bytes: self.bytes,
             pairs: self.pairs,
         }
     }
 
-    fn record(&self, camera: usize) -> Result<Record<'a>, LookupError> {
+    pub(crate) fn record(&self, camera: usize) -> Result<Record<'a>, LookupError> {
         self.records
             .get(camera)
             .map(Record)

@@ -32,6 +32,29 @@ impl Axis {
         (coordinate_px - self.min_px).to_bits() <= (self.max_px - self.min_px).to_bits()
     }
 
+    /// The region's extent, px.
+    pub(crate) fn extent_px(&self) -> f32 {
+        self.max_px - self.min_px
+    }
+
+    /// The coordinate at a share of the extent.
+    pub(crate) fn at_share(&self, share: f32) -> f32 {
+        self.min_px + share * self.extent_px()
+    }
+
+    /// The nearest coordinate that the axis contains; the middle for what is not a number.
+    pub(crate) fn clamped(&self, coordinate_px: f32) -> f32 {
+        if coordinate_px > self.max_px {
+            self.max_px
+        } else if coordinate_px < self.min_px {
+            self.min_px
+        } else if coordinate_px.is_nan() {
+            self.at_share(0.5)
+        } else {
+            coordinate_px
+        }
+    }
+
     /// The mask's cell at a coordinate that the axis contains.
     pub(crate) fn mask_cell(&self, coordinate_px: f32, mask_cells: u32) -> usize {
         let cell = ((coordinate_px - self.min_px) * self.mask_cells_per_px) as u32;
