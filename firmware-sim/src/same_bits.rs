@@ -22,7 +22,7 @@ pub fn digest(blob: &RayBlob<'_>, count: u32) -> Option<Digest> {
         match blob.triangulate_with_covariance((0, a), (1, b)) {
             Ok(measured) => {
                 digest.add_point(&measured);
-                if digest.points % PROJECTED_EVERY == 0 {
+                if digest.points.is_multiple_of(PROJECTED_EVERY) {
                     digest.add_projection(blob, &measured);
                 }
             }
@@ -56,23 +56,27 @@ impl Digest {
     }
 
     fn add_projection(&mut self, blob: &RayBlob<'_>, measured: &Measurement) {
-        match blob.project(1, &measured.found.point_mm) {
+        let words = match blob.project(1, &measured.found.point_mm) {
             Ok(pixel) => [pixel.u, pixel.v].map(f32::to_bits),
             Err(error) => [u32::from(error.code()); 2],
+        };
+        for word in words {
+            self.add(word);
         }
-        .into_iter()
-        .for_each(|word| self.add(word));
     }
 
     fn add_point(&mut self, measured: &Measurement) {
         self.points += 1;
         let found = &measured.found;
         let point: [f32; 3] = found.point_mm.into();
-        point.into_iter().for_each(|x| self.add(x.to_bits()));
+        for x in point {
+            self.add(x.to_bits());
+        }
         self.add(found.gap_squared_mm2.to_bits());
         if let Some(covariance) = measured.covariance {
-            let sigma_mm = covariance.sigma_mm();
-            sigma_mm.into_iter().for_each(|x| self.add(x.to_bits()));
+            for x in covariance.sigma_mm() {
+                self.add(x.to_bits());
+            }
         }
     }
 }

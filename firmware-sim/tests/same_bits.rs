@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use firmware_sim::qemu;
 use firmware_sim::same_bits::{Digest, digest};
-use ray_runtime::{Aligned, RayBlob};
+use ray_runtime::RayBlob;
 
 const MATCHES: u32 = 100_000;
 
@@ -23,8 +23,8 @@ fn blobs() -> Vec<PathBuf> {
 
 fn on_host(path: &Path) -> Digest {
     let contents = std::fs::read(path).unwrap();
-    let mut aligned = Box::new(Aligned([0_u8; 1 << 16]));
-    let bytes = &mut aligned.0[..contents.len()];
+    let mut words = vec![0_u64; contents.len().div_ceil(8)];
+    let (bytes, _) = bytemuck::cast_slice_mut(&mut words).split_at_mut(contents.len());
     bytes.copy_from_slice(&contents);
     digest(&RayBlob::open(bytes).unwrap(), MATCHES).unwrap()
 }

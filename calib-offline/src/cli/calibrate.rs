@@ -129,7 +129,7 @@ pub fn run(
     let object = CalibrateObject {
         schema: "calib-offline/calibrate/1",
         facts: Facts::of(&written.calibration),
-        blob: written.blob,
+        blob: written.blob.clone(),
         calibration,
         rig,
         report,
@@ -195,11 +195,7 @@ pub fn write_results(
     );
     console.progress().end();
     let packed = packed?;
-    let blob = BlobFacts {
-        bytes: packed.bytes.len(),
-        max_error_px: packed.worst_error_px,
-        wanted_error_px: BLOB_MAX_ERROR_PX,
-    };
+    let blob = BlobFacts::new(&packed, BLOB_MAX_ERROR_PX);
     if let Some(warning) = blob.warning() {
         console.warn(&warning);
     }
