@@ -1,7 +1,7 @@
 //! Points per second of CPU: a million matches by the runtime, by `calib-offline measure` with its
-//! files, and by OpenCV's `undistortPoints` and `triangulatePoints`, in one run.
+//! files, and by `OpenCV`'s `undistortPoints` and `triangulatePoints`, in one run.
 //!
-//! `cargo bench -p calib-offline --bench throughput`; OpenCV is measured if `python3` has `cv2` and numpy
+//! `cargo bench -p calib-offline --bench throughput`; `OpenCV` is measured if `python3` has `cv2` and numpy
 //! (`pip install opencv-python-headless numpy`).
 
 use calib_offline::pack::read_aligned;
