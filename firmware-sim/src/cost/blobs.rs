@@ -110,7 +110,7 @@ impl Asked {
 
 /// A camera's name and what sets it apart from others, which its rows cost what they do for.
 fn camera_cost(camera: &Camera<'_>) -> CameraCost {
-    let kind = if camera.is_central {
+    let kind = if camera.encoding.is_central {
         "central"
     } else {
         "not central"
