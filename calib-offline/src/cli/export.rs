@@ -45,8 +45,12 @@ pub struct ExportArgs {
     /// The number of the family of devices that may take it, for uf2: 0xe48bff56 is the RP2040's
     #[arg(long, value_name = "0x...", value_parser = parse_number)]
     pub family: Option<u32>,
-    /// The name of the array, for c [default: rays_blob]
-    #[arg(long, value_name = "SYMBOL")]
+    /// The name of the array.
+    #[arg(
+        long,
+        value_name = "SYMBOL",
+        help = "The name of the array, for c [default: rays_blob]"
+    )]
     pub name: Option<String>,
     /// Replace whatever stands in the output's place
     #[arg(long)]
