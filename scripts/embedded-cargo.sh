@@ -13,6 +13,7 @@ targets=()
 last=
 for argument in "$@"; do
   if [ "$last" = --target ]; then targets+=("$argument"); fi
+  case $argument in --target=*) targets+=("${argument#--target=}") ;; esac
   last=$argument
 done
 if [ ${#targets[@]} = 0 ]; then targets=(thumbv7em-none-eabihf); fi

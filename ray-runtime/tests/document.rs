@@ -23,9 +23,15 @@ fn golden() -> Vec<PathBuf> {
 }
 
 fn read(blob: &Path) -> Output {
-    let reader = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/read_blob.py");
+    read_with("read_blob.py", blob)
+}
+
+fn read_with(reader: &str, blob: &Path) -> Output {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
     Command::new("python3")
-        .arg(reader)
+        // Without the folder of compiled modules that Python would leave here.
+        .arg("-B")
+        .arg(folder.join(reader))
         .arg(blob)
         .output()
         .expect("python3 is missing: install Python 3, which checks that FORMAT.md is right")
@@ -57,6 +63,23 @@ fn a_reader_written_from_the_document_gives_the_bits_of_every_golden_blob() {
     }
     versions.sort_unstable();
     assert_eq!(versions, [1, 2, 3, 3]);
+}
+
+#[test]
+fn the_documents_covariance_gives_the_bits_of_every_golden_blob() {
+    for path in golden() {
+        let (_, header) = Header::read(&std::fs::read(&path).unwrap()).unwrap();
+        let output = read_with("read_uncertainty.py", &path);
+        let (printed, said) = (text(&output.stdout), text(&output.stderr));
+        let count = if header.version == 1 { 0 } else { 2 };
+        assert_eq!(
+            printed,
+            format!("{count} uncertainties, 0 with other bits\n"),
+            "{}: {said}",
+            path.display()
+        );
+        assert!(output.status.success());
+    }
 }
 
 #[test]

@@ -4,8 +4,7 @@ import functools, io, struct, sys, zlib
 
 class F(float):
     """f32: each operation is rounded to nearest (f64 has so many digits that rounding twice is rounding once)."""
-    def __new__(cls, x):
-        return float.__new__(cls, struct.unpack("<f", struct.pack("<f", x))[0])
+    __new__ = lambda cls, x: float.__new__(cls, struct.unpack("<f", struct.pack("<f", x))[0])
 for name in "add sub mul truediv radd rsub rmul rtruediv neg".split():
     setattr(F, f"__{name}__", lambda *a, op=getattr(float, f"__{name}__"): F(op(*map(F, a))))
 
@@ -80,21 +79,22 @@ def main(blob):
     require(magic == b"RAYS" and 1 <= version <= 3, "no blob of version 1 to 3")
     require((total, header_len) == (len(blob), 24) and crc == zlib.crc32(blob[16:], zlib.crc32(blob[:12])), "damaged")
     meta, first_record, kinds, wrong = io.BytesIO(blob[24:24 + meta_len]), (24 + meta_len + 7) // 8 * 8, [0, 0, 0], 0
-    print(version, pairs, *(meta.read(integer(meta)) for _ in range(3)), [integer(meta) for _ in range(2)])
+    print(version, pairs, *(meta.read(integer(meta)) for _ in range(3)), integer(meta), integer(meta))
     print(*numbers("f", meta.read(8), 0, 2), test_count := integer(meta))
     for at in range(first_record, first_record + 128 * cameras, 128):
         print(meta.read(integer(meta)), [integer(meta) for _ in range(6)], struct.unpack_from("<5I", blob, at))
     for kind in (integer(meta) for _ in range(test_count)):
         records, kinds[kind] = [first_record + 128 * integer(meta) for _ in range(min(kind, 1) + 1)], kinds[kind] + 1
         rays = [a for record in records for a in ray(blob, record, numbers("f", meta.read(8), 0, 2))]
-        stated = meta.read(4 * (6, 4, 3)[kind])
+        stated = meta.read((24, 16, 12)[kind])
         computed = (lambda: rays[0] + rays[1], lambda: match(*rays), lambda: numbers("f", stated, 0, 3))[kind]()
         wrong += stated != struct.pack(f"<{len(computed)}f", *computed)
     require(not meta.read(), "metadata that end late")
     print(f"{kinds[0]} rays and {kinds[1]} matches, {wrong} with other bits")
     return wrong
 
-try:
-    sys.exit(min(1, main(open(sys.argv[1], "rb").read())))
-except (ValueError, IndexError, ArithmeticError, struct.error) as reason:
-    sys.exit(f"refused: {reason}")
+if __name__ == "__main__":
+    try:
+        sys.exit(min(1, main(open(sys.argv[1], "rb").read())))
+    except (ValueError, IndexError, ArithmeticError, struct.error) as reason:
+        sys.exit(f"refused: {reason}")
