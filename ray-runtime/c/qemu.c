@@ -1,5 +1,5 @@
-/* The example on QEMU's mps2-an386, a Cortex-M4F, without a C library: vectors, start-up, and output by semihosting.
- * 16 MiB of memory at 0x21000000 stand for memory-mapped flash. */
+/* The example on QEMU's mps2-an386 (Cortex-M4F) and mps2-an385 (Cortex-M3), without a C library: vectors, start-up, and output
+ * by semihosting. 16 MiB of memory at 0x21000000 stand for memory-mapped flash. */
 #include "example.h"
 #include <stdint.h>
 
@@ -52,9 +52,11 @@ __attribute__((noreturn)) static void fault(void)
 
 __attribute__((noreturn)) static void reset(void)
 {
+#ifdef __ARM_FP
     /* CPACR: full access to the FPU, before anything can use it. */
     *(volatile uint32_t *)0xe000ed88 |= 0xfu << 20;
     __asm__ volatile("dsb\n\tisb" : : : "memory");
+#endif
     for (uint32_t *to = &data_start, *from = &data_load; to < &data_end;) {
         *to++ = *from++;
     }

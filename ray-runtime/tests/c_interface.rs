@@ -1,5 +1,5 @@
 //! The C interface in `c/`: `rays.h` says what the Rust code does, the example gives the bits of Rust on the
-//! host and, where a cross compiler is there, on a Cortex-M4F in QEMU; a panic would not link.
+//! host and, where a cross compiler is there, on Arm in QEMU, with an FPU and without; a panic would not link.
 
 use ray_runtime::{
     Aligned, LookupError, MeasureError, Measurement, OpenError, PixelPoint, Ray, RayBlob, Table,
@@ -281,75 +281,84 @@ fn what_cannot_be_opened_or_asked_has_its_code() {
     assert_eq!(printed, "all as it should be\n");
 }
 
+/// A kind of Arm: its Rust target, what its C compiler is told, and where QEMU runs it.
+struct Arm {
+    target: &'static str,
+    flags: &'static [&'static str],
+    machine: [&'static str; 2],
+}
+
+/// Ends with this code where there is no toolchain for a target.
+const NO_TOOLCHAIN: i32 = 3;
+
 #[test]
-fn the_example_gives_the_bits_of_rust_on_a_cortex_m4f() {
+fn the_example_gives_the_bits_of_rust_with_an_fpu() {
+    check_arm(&Arm {
+        target: "thumbv7em-none-eabihf",
+        flags: &["-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"],
+        machine: ["mps2-an386", "cortex-m4"],
+    });
+}
+
+#[test]
+fn the_example_gives_the_bits_of_rust_without_an_fpu() {
+    // Of the two, the smaller one has no division either.
+    check_arm(&Arm {
+        target: "thumbv7em-none-eabi",
+        flags: &["-mcpu=cortex-m4", "-mfloat-abi=soft"],
+        machine: ["mps2-an386", "cortex-m4"],
+    });
+    check_arm(&Arm {
+        target: "thumbv6m-none-eabi",
+        flags: &["-mcpu=cortex-m0", "-mfloat-abi=soft"],
+        machine: ["mps2-an385", "cortex-m3"],
+    });
+}
+
+fn check_arm(arm: &Arm) {
     const COMPILER: &str = "arm-none-eabi-gcc";
     if Command::new(COMPILER).arg("--version").output().is_err() {
         eprintln!(
-            "{COMPILER} is missing, so C was not tried on Arm: install gcc-arm-none-eabi, or run scripts/install-embedded.sh"
+            "{COMPILER} is missing, so C was not tried on {}: install gcc-arm-none-eabi, or run scripts/install-embedded.sh",
+            arm.target
         );
         return;
     }
-    let target = "thumbv7em-none-eabihf";
     let mut build = Command::new(root().join("scripts/embedded-cargo.sh"));
-    build.args([
-        "build",
-        "--release",
-        "--locked",
-        "--quiet",
-        "--target",
-        target,
-    ]);
-    succeed(
-        build
-            .arg("--manifest-path")
-            .arg(c_folder().join("Cargo.toml")),
-    );
-    let image = made("example-arm.elf");
+    build.args(["build", "--release", "--locked", "--quiet"]);
+    build.args(["--target", arm.target, "--manifest-path"]);
+    let output = run(build.arg(c_folder().join("Cargo.toml")));
+    let said = String::from_utf8_lossy(&output.stderr);
+    if output.status.code() == Some(NO_TOOLCHAIN) {
+        eprintln!("C was not tried on {}: {said}", arm.target);
+        return;
+    }
+    assert!(output.status.success(), "{}: {said}", arm.target);
+
+    let library = root().join("target/embedded").join(arm.target);
+    let image = made(&format!("example-{}.elf", arm.target));
     let mut link = Command::new(COMPILER);
-    link.args([
-        "-mcpu=cortex-m4",
-        "-mthumb",
-        "-mfloat-abi=hard",
-        "-mfpu=fpv4-sp-d16",
-    ])
-    .args([
-        "-std=c99",
-        "-O2",
-        "-ffreestanding",
-        "-nostdlib",
-        "-Wl,-z,noexecstack",
-    ])
-    .args(WARNINGS)
-    // Without --gc-sections: no part of the library may refer to what exists nowhere.
-    .args(["-T", "qemu.ld", "example.c", "qemu.c"])
-    .arg(
-        root()
-            .join("target/embedded")
-            .join(target)
-            .join("release/librays.a"),
-    )
-    .arg("-o")
-    .arg(&image)
-    .current_dir(c_folder());
+    link.args(["-mthumb", "-std=c99", "-O2", "-ffreestanding", "-nostdlib"])
+        .args(arm.flags)
+        .args(WARNINGS)
+        // Without --gc-sections: no part of the library may refer to what exists nowhere.
+        .args(["-Wl,-z,noexecstack", "-T", "qemu.ld", "example.c", "qemu.c"])
+        .arg(library.join("release/librays.a"))
+        .arg("-o")
+        .arg(&image)
+        .current_dir(c_folder());
     succeed(&mut link);
     check_bits(|blob| {
-        let mut qemu = Command::new("timeout");
-        qemu.args([
-            "120",
-            "qemu-system-arm",
-            "-machine",
-            "mps2-an386",
-            "-cpu",
-            "cortex-m4",
-        ])
-        .args(["-display", "none", "-monitor", "none", "-serial", "none"])
-        .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
-        .arg(&image)
-        .arg("-device");
+        let [machine, cpu] = arm.machine;
         let file = blob.display().to_string().replace(',', ",,");
         let loader = format!("loader,file={file},addr=0x21000000,force-raw=on");
-        succeed(qemu.arg(loader))
+        let mut qemu = Command::new("timeout");
+        qemu.args(["120", "qemu-system-arm", "-machine", machine, "-cpu", cpu])
+            .args(["-display", "none", "-monitor", "none", "-serial", "none"])
+            .args(["-semihosting-config", "enable=on,target=native"])
+            .args(["-device", &loader, "-kernel"])
+            .arg(&image);
+        succeed(&mut qemu)
     });
 }
 
