@@ -26,12 +26,12 @@ def polynomial(rest, x, y):
         total, length = total * y + row, length + 1
     return total
 
-def spline(axes, cells, x, knot):
+def spline(axes, cells, x, knot, small):
     def blend(k, a, b, c, d):
-        t = ((x[k] - cells[k] * axes[k][3]) - cells[k] * axes[k][4]) * axes[k][2]
-        r = 1 - t
+        r = 1 - (t := ((x[k] - cells[k] * axes[k][3]) - cells[k] * axes[k][4]) * axes[k][2])
         w0, w2, w3 = ((r * r) * r) * F(1 / 6), F(2 / 3) - (r * r) * (1 - 0.5 * r), ((t * t) * t) * F(1 / 6)
-        return b + ((w0 * (a - b) + w2 * (c - b)) + w3 * (d - b))
+        differences = (w0 * (a - b) + w2 * (c - b)) + w3 * (d - b)
+        return ((w0 * a + (((1 - w0) - w2) - w3) * b) + w2 * c) + w3 * d if small else b + differences
     return blend(1, *(blend(0, *(knot(cells[0] + i, cells[1] + j) for i in range(4))) for j in range(4)))
 
 def table(blob, record, pixel):  # s1, s2 and, if the camera is not central, n1, n2
@@ -44,18 +44,18 @@ def table(blob, record, pixel):  # s1, s2 and, if the camera is not central, n1,
     require(blob[mask + bit // 8] >> bit % 8 & 1, "a self-test at a pixel that is not calibrated")
     knots = lambda code, start, stride: lambda i, j: numbers(code, blob, start + stride * (j * (cells_u + 3) + i), 1)[0]
     if encoding <= 2:
-        return [spline(axes, cells, x, knots("f", at + 4 * k, 8 * maps)) for k in range(2 * maps)]
+        return [spline(axes, cells, x, knots("f", at + 4 * k, 8 * maps), False) for k in range(2 * maps)]
     if encoding <= 4:
         x, y = ((a - c * axis[3]) * axis[2] for a, c, axis in zip(x, cells, axes))
         patches = numbers("f", blob, at + 80 * maps * (cells[1] * cells_u + cells[0]), 20 * maps)
         return [polynomial(patches[20 * (k // 2) + k % 2:][:20:2], x, y) for k in range(2 * maps)]
-    *kinds, step_s, step_n, scale_u, scale_v, start_n, knots_s, knots_n = struct.unpack_from("<4B4f3I", blob, at)
-    found, parts = [], [(*kinds[:2], step_s, 32, knots_s), (*kinds[2:], step_n, start_n, knots_n)]
-    for k, (degree, size, step, start, first_knot) in ((k, parts[k // 2]) for k in range(2 * maps)):
+    scale, found = numbers("f", blob, at + 32, 2), []
+    for k in range(2 * maps):
+        degree, size, _, step, start, first_knot = struct.unpack_from("<BBHfII", blob, at + 16 * (k // 2))
         coefficients = numbers("f", blob, at + start, (degree + 1) * (degree + 2))[k % 2::2]
-        found.append(polynomial(coefficients, x[0] * F(scale_u) - 1, x[1] * F(scale_v) - 1))
+        found.append(polynomial(coefficients, x[0] * scale[0] - 1, x[1] * scale[1] - 1))
         if size > 0:
-            found[k] += F(step) * spline(axes, cells, x, knots("?bh"[size], at + first_knot + size * (k % 2), 2 * size))
+            found[k] += F(step) * spline(axes, cells, x, knots("?bh"[size], at + first_knot + size * (k % 2), 2 * size), True)
     return found
 
 def ray(blob, record, pixel):
@@ -75,9 +75,9 @@ def match(o1, d1, o2, d2):
     return *(((a + b * l1) + (c + d * l2)) * 0.5 for a, b, c, d in zip(o1, d1, o2, d2)), dot(w, n) * dot(w, n) * k
 
 def main(blob):
-    magic, version, header_len, total, crc, meta_len, cameras, pairs = struct.unpack_from("<4sHHIIIHH", blob)
+    magic, version, *lengths, crc, meta_len, cameras, pairs = struct.unpack_from("<4sHHIIIHH", blob)
     require(magic == b"RAYS" and 1 <= version <= 3, "no blob of version 1 to 3")
-    require((total, header_len) == (len(blob), 24) and crc == zlib.crc32(blob[16:], zlib.crc32(blob[:12])), "damaged")
+    require(lengths == [24, len(blob)] and crc == zlib.crc32(blob[16:], zlib.crc32(blob[:12])), "damaged")
     meta, first_record, kinds, wrong = io.BytesIO(blob[24:24 + meta_len]), (24 + meta_len + 7) // 8 * 8, [0, 0, 0], 0
     print(version, pairs, *(meta.read(integer(meta)) for _ in range(3)), integer(meta), integer(meta))
     print(*numbers("f", meta.read(8), 0, 2), test_count := integer(meta))

@@ -21,7 +21,7 @@ class D(F):
         return D.__add__(a, -F(b)) if not isinstance(b, D) else D(F(a) - F(b), (x - y for x, y in zip(a.slopes, b.slopes)))
     __radd__, __rmul__ = __add__, __mul__
 
-def spline(axes, cells, x, knot):
+def spline(axes, cells, x, knot, small):
     """The spline, and its blends with the other weights."""
     def weights(k):
         t = ((F(x[k]) - cells[k] * axes[k][3]) - cells[k] * axes[k][4]) * axes[k][2]
@@ -29,8 +29,12 @@ def spline(axes, cells, x, knot):
         places = ((r * r) * r) * F(1 / 6), F(2 / 3) - (r * r) * (1 - 0.5 * r), ((t * t) * t) * F(1 / 6)
         return places, ((-0.5 * (r * r)) * density, (r * (2 - 1.5 * r)) * density, (0.5 * (t * t)) * density)
     def change(w, a, b, c, d):
+        if small:
+            return ((w[0] * a + ((-w[0] - w[1]) - w[2]) * b) + w[1] * c) + w[2] * d
         return (w[0] * (a - b) + w[1] * (c - b)) + w[2] * (d - b)
     def blend(w, a, b, c, d):
+        if small:
+            return ((w[0] * a + (((1 - w[0]) - w[1]) - w[2]) * b) + w[1] * c) + w[2] * d
         return b + change(w, a, b, c, d)
     (wu, eu), (wv, ev) = weights(0), weights(1)
     window = [[knot(cells[0] + i, cells[1] + j) for i in range(4)] for j in range(4)]

@@ -251,8 +251,8 @@ mod tests {
         ] {
             assert!(page.contains(part), "{part} is not in the page");
         }
-        assert_eq!(page.matches("<svg").count(), 11);
-        assert_eq!(page.matches("How to read this").count(), 9);
+        assert_eq!(page.matches("<svg").count(), 12);
+        assert_eq!(page.matches("How to read this").count(), 10);
     }
 
     #[test]
