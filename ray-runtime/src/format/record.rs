@@ -17,7 +17,7 @@ pub struct Record<'a>(pub &'a [u32; RECORD_WORDS]);
 /// A camera's record as the packer holds it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RecordFields {
-    /// [`Encoding::number`].
+    /// [`Encoding::number`](super::Encoding::number).
     pub encoding: u32,
     /// Cells of the control grid along u and v.
     pub cells: [u32; 2],
