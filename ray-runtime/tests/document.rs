@@ -62,7 +62,8 @@ fn a_reader_written_from_the_document_gives_the_bits_of_every_golden_blob() {
         );
     }
     versions.sort_unstable();
-    assert_eq!(versions, [1, 2, 3, 3]);
+    versions.dedup();
+    assert_eq!(versions, [1, 2, 3]);
 }
 
 #[test]

@@ -51,11 +51,11 @@ def table(blob, record, pixel):  # s1, s2 and, if the camera is not central, n1,
         return [polynomial(patches[20 * (k // 2) + k % 2:][:20:2], x, y) for k in range(2 * maps)]
     scale, found = numbers("f", blob, at + 32, 2), []
     for k in range(2 * maps):
-        degree, size, _, step, start, first_knot = struct.unpack_from("<BBHfII", blob, at + 16 * (k // 2))
+        degree, size, _, step, start, first = struct.unpack_from("<BBHfII", blob, at + 16 * (k // 2))
         coefficients = numbers("f", blob, at + start, (degree + 1) * (degree + 2))[k % 2::2]
         found.append(polynomial(coefficients, x[0] * scale[0] - 1, x[1] * scale[1] - 1))
         if size > 0:
-            found[k] += F(step) * spline(axes, cells, x, knots("?bh"[size], at + first_knot + size * (k % 2), 2 * size), True)
+            found[k] += F(step) * spline(axes, cells, x, knots("?bh"[size], at + first + size * (k % 2), 2 * size), True)
     return found
 
 def ray(blob, record, pixel):
