@@ -55,7 +55,7 @@ def table(blob, record, pixel):  # s1, s2 and, if the camera is not central, n1,
         coefficients = numbers("f", blob, at + start, (degree + 1) * (degree + 2))[k % 2::2]
         found.append(polynomial(coefficients, x[0] * scale[0] - 1, x[1] * scale[1] - 1))
         if size > 0:
-            found[k] += F(step) * spline(axes, cells, x, knots("?bh"[size], at + first + size * (k % 2), 2 * size), True)
+            found[k] += F(step) * spline(axes, cells, x, knots("?bh"[size], at + first + size * (k % 2), 2 * size), 1)
     return found
 
 def ray(blob, record, pixel):
