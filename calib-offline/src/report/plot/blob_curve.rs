@@ -30,7 +30,7 @@ pub fn draw(blob: &BlobFacts) -> Option<Figure> {
     axes.draw_y(&mut svg, &decades(bottom as i32, top as i32));
     let drawn: Vec<[f64; 2]> = points.iter().map(|[x, y]| axes.at(*x, *y)).collect();
     svg.line(
-        "stage",
+        "limit",
         axes.at(axes.x[0], wanted),
         axes.at(axes.x[1], wanted),
     );
