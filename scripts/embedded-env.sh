@@ -12,9 +12,10 @@
 repository=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 embedded_target_dir=$repository/target/embedded
 
-# What an outer cargo, clippy or rustup leaves in the environment would otherwise reach the inner build.
+# What an outer cargo, clippy or rustup leaves in the environment would otherwise reach the inner build; incremental compilation
+# would even split the images into units of other code, so that their counts would depend on it.
 unset RUSTC RUSTDOC RUSTFLAGS CARGO_ENCODED_RUSTFLAGS RUSTC_WRAPPER RUSTC_WORKSPACE_WRAPPER RUSTC_BOOTSTRAP \
-  CARGO CARGO_BUILD_TARGET CARGO_BUILD_RUSTFLAGS
+  CARGO CARGO_BUILD_TARGET CARGO_BUILD_RUSTFLAGS CARGO_INCREMENTAL
 export CARGO_TARGET_DIR=$embedded_target_dir
 
 embedded_has_rustup_target() {
