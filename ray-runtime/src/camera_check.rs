@@ -99,14 +99,12 @@ impl CameraCheck<'_> {
         let second = (!encoding.is_central).then_some(offset);
         let (expected, len) =
             QuantizedHeader::new(direction, second, extent_px, self.record.cells());
-        // Starts, and of a central camera all of the offset. A step that is no number fits nothing.
-        if !(direction == expected.direction && offset == expected.offset) {
-            let is_number = !(direction.step.is_nan() || offset.step.is_nan());
-            return Err(if is_number {
-                self.layout(Table::Grid)
-            } else {
-                self.number(Table::Grid)
-            });
+        let starts = |map: QuantizedMap| [map.coefficients_start, map.knots_start];
+        let is_placed = starts(direction) == starts(expected.direction)
+            && starts(offset) == starts(expected.offset)
+            && (second.is_some() || offset == QuantizedMap::default());
+        if !is_placed {
+            return Err(self.layout(Table::Grid));
         }
         let is_step = |map: QuantizedMap| map.step >= 0.0 && is_moderate(map.step);
         if !(header.scale == expected.scale && is_step(direction) && is_step(offset)) {

@@ -181,7 +181,7 @@ impl Views<'_> {
     /// the table was checked.
     #[inline(never)]
     fn spline<T: Evaluated>(self, record: Record<'_>, pixel: PixelPoint) -> Option<Sample<T>> {
-        let is_central = record.encoding() == CENTRAL_SPLINE;
+        let is_central = record.is_central();
         let knots = |channels: usize| {
             let first = (record.grid_offset() >> 3) as usize + channels;
             Some(Knots::F32 {
@@ -218,8 +218,7 @@ impl MovingRay {
 
 /// The ray of a sample of a camera's table, rig frame.
 fn ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
-    // Odd numbers are central.
-    if record.encoding() & 1 == 1 {
+    if record.is_central() {
         central_ray(record, sample.s)
     } else {
         shifted_ray(record, sample)

@@ -27,8 +27,7 @@ pub(crate) fn sample<T: Evaluated>(
         y: T::along_v(y, scale_v),
     };
     let s = place.map(table, [direction_a, direction_b])?;
-    // Odd numbers are central.
-    let n = if record.encoding() & 1 == 1 {
+    let n = if record.is_central() {
         [T::from(0.0); 2]
     } else {
         place.map(table, [offset_a, offset_b])?

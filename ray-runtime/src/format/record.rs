@@ -67,6 +67,11 @@ impl Record<'_> {
         self.0[0]
     }
 
+    /// Whether all rays start in the camera's reference point: encodings with odd numbers.
+    pub const fn is_central(self) -> bool {
+        self.encoding() & 1 == 1
+    }
+
     /// Cells of the control grid along u and v.
     pub const fn cells(self) -> [u32; 2] {
         [self.0[1], self.0[2]]
