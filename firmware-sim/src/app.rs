@@ -5,8 +5,8 @@ use ray_runtime::{MeasureError, OpenError, PixelPoint, RayBlob};
 
 use crate::port::{BlobStore, Clock};
 use crate::protocol::{
-    BlobStatus, CameraStatus, Hello, MAX_MATCHES, Match, Measured, Point, Refusal, Reply, Request,
-    Sighting, Status, name,
+    BlobStatus, CameraStatus, Hello, MAX_CHUNK, MAX_MATCHES, Match, Measured, Point, Refusal,
+    Reply, Request, Sighting, SlotState, Status, name,
 };
 use crate::session::Responder;
 
@@ -42,6 +42,8 @@ impl<'f, C: Clock> Device<'f, C> {
             device: name(self.kind),
             firmware: name(FIRMWARE_VERSION),
             max_matches: MAX_MATCHES as u8,
+            max_chunk: MAX_CHUNK as u16,
+            max_blob: 0,
         }
     }
 
@@ -55,6 +57,13 @@ impl<'f, C: Clock> Device<'f, C> {
                 .as_ref()
                 .map(blob_status)
                 .map_err(|error| error.code()),
+            active_slot: None,
+            slots: [SlotState::Empty; 2],
+            update: None,
+            max_blob: 0,
+            updates: 0,
+            rollbacks: 0,
+            rig: None,
         }
     }
 
@@ -76,6 +85,7 @@ impl<C: Clock> Responder for Device<'_, C> {
             Request::Hello => Reply::Hello(self.hello()),
             Request::Status => Reply::Status(self.status()),
             Request::Measure(matches) => self.measure(matches),
+            _ => Reply::Refused(Refusal::UnknownMessage),
         };
         match reply {
             Reply::Refused(refusal) => self.note_refused(refusal),

@@ -391,6 +391,10 @@ fn unexpected(asked: &'static str, reply: &Reply) -> ClientError {
         Reply::Hello(_) => "an answer to hello",
         Reply::Status(_) => "an answer to status",
         Reply::Measured(_) => "an answer to measure",
+        Reply::Receiving { .. } => "an acknowledgement of a blob's bytes",
+        Reply::Active(_) => "an answer to an update",
+        Reply::Aborted => "an answer to the end of an update",
+        Reply::SelfTested(_) => "an answer to the self-test",
     };
     ClientError::BadReply {
         asked,

@@ -33,6 +33,11 @@ const HEAD_LENGTH: usize = 3;
 const CHECKSUM_LENGTH: usize = 4;
 static CHECKSUM: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
+/// CRC-32/ISO-HDLC (zlib's) of `bytes`: of frames, of blobs under way, of commit records.
+pub fn checksum(bytes: &[u8]) -> u32 {
+    CHECKSUM.checksum(bytes)
+}
+
 /// A refusal together with the sequence number to answer it under.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rejected {

@@ -8,15 +8,27 @@
 //!
 //! Pixels have (0, 0) at the center of the top-left pixel; points are in the rig's frame, mm.
 
+mod refusal;
+
 use heapless::{String, Vec};
 use ray_runtime::Measurement;
 use serde::{Deserialize, Serialize};
 
+pub use refusal::{FlashOperation, Refusal, RigPart};
+
 /// The protocol spoken here. It stands in every frame, and a device refuses any other.
-pub const PROTOCOL_VERSION: u8 = 2;
+pub const PROTOCOL_VERSION: u8 = 3;
 
 /// Matches in one [`Request::Measure`]: with 28 both messages stay below 1 KiB.
 pub const MAX_MATCHES: usize = 28;
+
+/// Bytes of a blob in one [`Request::Chunk`]: a multiple of every program unit, below 1 KiB with its
+/// head.
+pub const MAX_CHUNK: usize = 896;
+
+/// Every chunk but the last has a multiple of so many bytes, so that flash can be programmed in whole
+/// units as chunks come.
+pub const CHUNK_UNIT: usize = 8;
 
 /// Cameras listed in a [`Status`]; a blob may hold more, [`BlobStatus::camera_count`] says how
 /// many.
@@ -42,13 +54,33 @@ pub enum Request {
     Status,
     /// Triangulate these. Answered by [`Reply::Measured`], entry by entry in the same order.
     Measure(Vec<Match, MAX_MATCHES>),
+    /// A new blob is coming. Answered by [`Reply::Receiving`], or by [`Reply::Active`] if this very
+    /// blob is active already and nothing needs to be sent.
+    ///
+    /// If this very blob is under way, from whichever peer, its transfer goes on where it stopped:
+    /// the answer says how much has arrived. Any other transfer of the same peer is given up, and
+    /// that of another peer once it has been silent for a while.
+    BeginUpdate(NewBlob),
+    /// The next bytes of the new blob. Answered by [`Reply::Receiving`].
+    ///
+    /// Chunks come in order. A repeat of the last one is acknowledged again; any other place is
+    /// refused with the one expected.
+    Chunk(Chunk),
+    /// All bytes were sent: check the new blob and make it active. Answered by [`Reply::Active`].
+    FinishUpdate,
+    /// Give the transfer up. Answered by [`Reply::Aborted`], also if there is none.
+    AbortUpdate,
+    /// Make the other slot's blob active, after a check of all of it. Answered by [`Reply::Active`].
+    Rollback,
+    /// Compare the active blob's self-tests. Answered by [`Reply::SelfTested`].
+    SelfTest,
 }
 
 /// What a device answers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[allow(clippy::large_enum_variant)]
 pub enum Reply {
-    /// The request could not be carried out; nothing on the device changed.
+    /// The request could not be carried out. Which blob is active did not change.
     Refused(Refusal),
     /// Answer to [`Request::Hello`].
     Hello(Hello),
@@ -56,6 +88,71 @@ pub enum Reply {
     Status(Status),
     /// Answer to [`Request::Measure`].
     Measured(Vec<Measured, MAX_MATCHES>),
+    /// A blob is under way: how many of its bytes have been stored.
+    Receiving {
+        /// From the first on; the next chunk starts here.
+        received: u32,
+    },
+    /// This blob is active, now and after any restart.
+    Active(StoredBlob),
+    /// Nothing is under way any more.
+    Aborted,
+    /// Answer to [`Request::SelfTest`].
+    SelfTested(SelfTestReport),
+}
+
+/// A blob to be sent.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct NewBlob {
+    /// Its length, bytes.
+    pub length: u32,
+    /// CRC-32/ISO-HDLC of all its bytes (zlib's): [`crate::frame::checksum`].
+    pub checksum: u32,
+    /// Its identity, which must be the one that it states itself.
+    pub identity: [u8; IDENTITY_LENGTH],
+    /// Serial number of the rig it was calibrated on, if known: a device that knows its own takes
+    /// no other.
+    pub rig_serial: Option<Name>,
+}
+
+/// A piece of a blob on its way.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Chunk {
+    /// Where in the blob it starts.
+    pub offset: u32,
+    /// A multiple of [`CHUNK_UNIT`] bytes, unless it is the last.
+    pub bytes: Vec<u8, MAX_CHUNK>,
+}
+
+/// A blob in a slot, with a valid commit record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StoredBlob {
+    /// Which slot, 0 or 1.
+    pub slot: u8,
+    /// Of its commit record: the highest is the active one.
+    pub sequence: u32,
+    /// Its length, bytes.
+    pub length: u32,
+    /// CRC-32 of all its bytes.
+    pub checksum: u32,
+    /// Hash of the calibration it was packed from.
+    pub identity: [u8; IDENTITY_LENGTH],
+}
+
+/// What the self-tests of the active blob gave on this device.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SelfTestReport {
+    /// How many the blob holds.
+    pub tests: u16,
+    /// How many gave the very bits of the host that packed it.
+    pub equal: u16,
+    /// How many gave no answer at all where there should be one.
+    pub unanswered: u16,
+    /// Largest difference of a coordinate of a ray's origin, of a point or of a standard deviation,
+    /// mm.
+    pub worst_mm: f32,
+    /// Largest difference of a component of a ray's direction.
+    pub worst_direction: f32,
 }
 
 /// A point seen by two cameras.
@@ -135,6 +232,10 @@ pub struct Hello {
     pub firmware: Name,
     /// [`MAX_MATCHES`] as the device was built with.
     pub max_matches: u8,
+    /// [`MAX_CHUNK`] as the device was built with, bytes.
+    pub max_chunk: u16,
+    /// Longest blob that a slot of its flash holds, bytes.
+    pub max_blob: u32,
 }
 
 /// How the device is.
@@ -149,6 +250,58 @@ pub struct Status {
     /// The blob in use, or the stable code of the runtime's `OpenError` that says why there is
     /// none.
     pub blob: Result<BlobStatus, u8>,
+    /// Which slot it is in.
+    pub active_slot: Option<u8>,
+    /// What each slot holds.
+    pub slots: [SlotState; 2],
+    /// The blob under way, if any.
+    pub update: Option<UpdateStatus>,
+    /// Longest blob that a slot holds, bytes.
+    pub max_blob: u32,
+    /// Blobs made active by an update since start; stops at its maximum.
+    pub updates: u32,
+    /// Rollbacks since start; stops at its maximum.
+    pub rollbacks: u32,
+    /// What the device knows of its own cameras; without it, any blob is taken.
+    pub rig: Option<Rig>,
+}
+
+/// What a slot holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum SlotState {
+    /// Nothing that was ever finished.
+    Empty,
+    /// The blob under way goes here.
+    Receiving,
+    /// A whole blob.
+    Holds(StoredBlob),
+    /// There is a commit record, but the blob behind it cannot be used.
+    Unusable {
+        /// Of its commit record.
+        sequence: u32,
+        /// The stable code of the runtime's `OpenError`.
+        open_error: u8,
+    },
+}
+
+/// How far an update has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct UpdateStatus {
+    /// Length of the new blob, bytes.
+    pub length: u32,
+    /// How much of it has been stored, bytes.
+    pub received: u32,
+    /// Its identity, as announced.
+    pub identity: [u8; IDENTITY_LENGTH],
+}
+
+/// What a device knows of the cameras it is built with, from its factory record.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Rig {
+    /// Serial number of the rig; empty if it has none.
+    pub serial: Name,
+    /// Its cameras, in the order of the blob.
+    pub cameras: Vec<CameraStatus, MAX_CAMERAS_LISTED>,
 }
 
 /// The blob in use.
@@ -164,43 +317,15 @@ pub struct BlobStatus {
     pub cameras: Vec<CameraStatus, MAX_CAMERAS_LISTED>,
 }
 
-/// A camera of the blob in use.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// A camera, of the blob in use or of the device itself.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CameraStatus {
     /// Its name.
     pub name: Name,
-    /// Width of the sensor it was calibrated for, px.
+    /// Width of the sensor, px.
     pub width_px: u32,
     /// Height of that sensor, px.
     pub height_px: u32,
-}
-
-/// Why a frame or a request was refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Refusal {
-    /// More bytes than a frame may have came without a delimiter.
-    Oversized {
-        /// Most bytes between two delimiters.
-        limit: u16,
-    },
-    /// The bytes between two delimiters are no COBS encoding, or too few for a head and a checksum.
-    BadFrame,
-    /// The checksum does not match: the frame was damaged on its way.
-    BadChecksum,
-    /// The frame is whole, but of another protocol version.
-    WrongVersion {
-        /// The version in the frame.
-        found: u8,
-        /// The version spoken here.
-        supported: u8,
-    },
-    /// The frame is whole, but its body is no message known here.
-    UnknownMessage,
-    /// Nothing can be measured: no blob could be opened.
-    NoBlob {
-        /// The stable code of the runtime's `OpenError`.
-        open_error: u8,
-    },
 }
 
 /// `text` as it travels: cut at the last character that fits.
@@ -212,35 +337,6 @@ pub fn name(text: &str) -> Name {
         }
     }
     name
-}
-
-impl core::fmt::Display for Refusal {
-    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Oversized { limit } => {
-                write!(formatter, "the frame is longer than {limit} bytes")
-            }
-            Self::BadFrame => write!(formatter, "the bytes are no frame"),
-            Self::BadChecksum => write!(formatter, "the frame was damaged on its way"),
-            Self::WrongVersion { found, supported } => {
-                write!(
-                    formatter,
-                    "the frame is of protocol version {found}, {supported} is spoken"
-                )
-            }
-            Self::UnknownMessage => write!(formatter, "the frame holds no known message"),
-            Self::NoBlob { open_error } => {
-                // The codes are the runtime's; these are the ones that a user can act upon.
-                let reason = match open_error {
-                    2 => "its flash holds no blob",
-                    3 => "the blob in its flash is of a version that it does not read",
-                    5 => "the blob in its flash is damaged",
-                    _ => "the blob in its flash cannot be opened",
-                };
-                write!(formatter, "{reason} (code {open_error})")
-            }
-        }
-    }
 }
 
 #[cfg(test)]

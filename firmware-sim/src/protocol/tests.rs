@@ -6,8 +6,9 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::{
-    BlobStatus, CameraStatus, Hello, MAX_CAMERAS_LISTED, MAX_MATCHES, MAX_NAME, Match, Measured,
-    Name, Point, Refusal, Reply, Request, Sighting, Status, name,
+    BlobStatus, CameraStatus, Chunk, FlashOperation, Hello, MAX_CAMERAS_LISTED, MAX_CHUNK,
+    MAX_MATCHES, MAX_NAME, Match, Measured, Name, NewBlob, Point, Refusal, Reply, Request, Rig,
+    RigPart, SelfTestReport, Sighting, SlotState, Status, StoredBlob, UpdateStatus, name,
 };
 use crate::frame::{FrameWriter, MAX_MESSAGE};
 
@@ -55,6 +56,97 @@ fn bytes_of_requests() {
 }
 
 #[test]
+fn bytes_of_an_update() {
+    let new = NewBlob {
+        length: 200,
+        checksum: 1,
+        identity: [9; 16],
+        rig_serial: Some(name("s")),
+    };
+    #[rustfmt::skip]
+    assert_bytes(&Request::BeginUpdate(new), &[
+        3, 0xc8, 0x01, 1,
+        9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9,
+        1, 1, b's',
+    ]);
+    let chunk = Chunk {
+        offset: 128,
+        bytes: vec(&[5, 255, 0]),
+    };
+    assert_bytes(&Request::Chunk(chunk), &[4, 0x80, 0x01, 3, 5, 255, 0]);
+    assert_bytes(&Request::FinishUpdate, &[5]);
+    assert_bytes(&Request::AbortUpdate, &[6]);
+    assert_bytes(&Request::Rollback, &[7]);
+    assert_bytes(&Request::SelfTest, &[8]);
+
+    assert_bytes(&Reply::Receiving { received: 128 }, &[4, 0x80, 0x01]);
+    #[rustfmt::skip]
+    assert_bytes(&Reply::Active(STORED), &[
+        5, 1, 2, 3, 4,
+        6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6,
+    ]);
+    assert_bytes(&Reply::Aborted, &[6]);
+    let report = SelfTestReport {
+        tests: 3,
+        equal: 2,
+        unanswered: 1,
+        worst_mm: 1.0,
+        worst_direction: 0.5,
+    };
+    assert_bytes(
+        &Reply::SelfTested(report),
+        &[7, 3, 2, 1, 0, 0, 0x80, 0x3f, 0, 0, 0, 0x3f],
+    );
+}
+const STORED: StoredBlob = StoredBlob {
+    slot: 1,
+    sequence: 2,
+    length: 3,
+    checksum: 4,
+    identity: [6; 16],
+};
+
+#[test]
+fn bytes_of_an_updates_refusals() {
+    use Refusal as R;
+    let rig = R::OtherRig {
+        camera: 1,
+        what: RigPart::Height,
+        expected: 3,
+        found: 4,
+    };
+    let failed = R::FlashFailed {
+        operation: FlashOperation::Program,
+        address: 128,
+    };
+    for (refusal, bytes) in [
+        (R::TooLong { limit: 1 }, &[6, 1][..]),
+        (R::WrongOffset { expected: 128 }, &[7, 0x80, 0x01]),
+        (R::BadChunk { missing: 8 }, &[8, 8]),
+        (R::NoUpdate, &[9]),
+        (R::Incomplete { received: 5 }, &[10, 5]),
+        (
+            R::ChecksumMismatch {
+                announced: 1,
+                stored: 2,
+            },
+            &[11, 1, 2],
+        ),
+        (R::NotABlob { open_error: 5 }, &[12, 5]),
+        (R::OtherIdentity, &[13]),
+        (rig, &[14, 1, 3, 3, 4]),
+        (R::NothingToRollBackTo, &[15]),
+        (R::LogFull, &[16]),
+        (failed, &[17, 2, 0x80, 0x01]),
+        (R::Busy { wait_ms: 7 }, &[18, 7]),
+    ] {
+        assert_bytes(&Reply::Refused(refusal), &[&[0], bytes].concat());
+        // In words, of which the last say what to do.
+        assert!(refusal.to_string().len() > 40, "{refusal}");
+    }
+}
+
+#[test]
 fn bytes_of_refusals() {
     assert_bytes(
         &Reply::Refused(Refusal::Oversized { limit: 1030 }),
@@ -80,10 +172,12 @@ fn bytes_of_answers() {
         device: name("ab"),
         firmware: name("0.1"),
         max_matches: 28,
+        max_chunk: 896,
+        max_blob: 5,
     };
     assert_bytes(
         &Reply::Hello(hello),
-        &[1, 2, b'a', b'b', 3, b'0', b'.', b'1', 28],
+        &[1, 2, b'a', b'b', 3, b'0', b'.', b'1', 28, 0x80, 0x07, 5],
     );
 
     let without = Status {
@@ -91,8 +185,18 @@ fn bytes_of_answers() {
         answered: 2,
         refused: 3,
         blob: Err(5),
+        active_slot: None,
+        slots: [SlotState::Empty, SlotState::Receiving],
+        update: None,
+        max_blob: 4,
+        updates: 5,
+        rollbacks: 6,
+        rig: None,
     };
-    assert_bytes(&Reply::Status(without), &[2, 1, 2, 3, 1, 5]);
+    assert_bytes(
+        &Reply::Status(without.clone()),
+        &[2, 1, 2, 3, 1, 5, 0, 0, 1, 0, 4, 5, 6, 0],
+    );
     let camera = CameraStatus {
         name: name("l"),
         width_px: 128,
@@ -102,13 +206,28 @@ fn bytes_of_answers() {
         identity: [7; 16],
         length: 129,
         camera_count: 1,
-        cameras: vec(&[camera]),
+        cameras: vec(std::slice::from_ref(&camera)),
     };
     let with = Status {
-        uptime_ms: 1,
-        answered: 2,
-        refused: 3,
         blob: Ok(blob),
+        active_slot: Some(1),
+        slots: [
+            SlotState::Unusable {
+                sequence: 1,
+                open_error: 5,
+            },
+            SlotState::Holds(STORED),
+        ],
+        update: Some(UpdateStatus {
+            length: 9,
+            received: 8,
+            identity: [1; 16],
+        }),
+        rig: Some(Rig {
+            serial: name("s"),
+            cameras: vec(&[camera]),
+        }),
+        ..without
     };
     #[rustfmt::skip]
     assert_bytes(&Reply::Status(with), &[
@@ -116,6 +235,12 @@ fn bytes_of_answers() {
         7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 7,
         0x81, 0x01, 1,          // 129 bytes, one camera
         1, 1, b'l', 0x80, 0x01, 100,
+        1, 1,                   // slot 1
+        3, 1, 5,
+        2, 1, 2, 3, 4, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6,
+        1, 9, 8, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        4, 5, 6,
+        1, 1, b's', 1, 1, b'l', 0x80, 0x01, 100,
     ]);
 
     let point = Point {
@@ -180,18 +305,41 @@ fn the_longest_messages_fit_a_frame() {
         identity: [0xff; 16],
         length: u32::MAX,
         camera_count: u8::MAX,
-        cameras: vec(&vec![camera; MAX_CAMERAS_LISTED]),
+        cameras: vec(&vec![camera.clone(); MAX_CAMERAS_LISTED]),
+    };
+    let stored = StoredBlob {
+        slot: 1,
+        sequence: u32::MAX,
+        length: u32::MAX,
+        checksum: u32::MAX,
+        ..STORED
     };
     let status = Status {
         uptime_ms: u64::MAX,
         answered: u32::MAX,
         refused: u32::MAX,
         blob: Ok(blob),
+        active_slot: Some(1),
+        slots: [SlotState::Holds(stored); 2],
+        update: Some(UpdateStatus {
+            length: u32::MAX,
+            received: u32::MAX,
+            identity: [0xff; 16],
+        }),
+        max_blob: u32::MAX,
+        updates: u32::MAX,
+        rollbacks: u32::MAX,
+        rig: Some(Rig {
+            serial: longest.clone(),
+            cameras: vec(&vec![camera; MAX_CAMERAS_LISTED]),
+        }),
     };
     let hello = Hello {
         device: longest.clone(),
         firmware: longest,
         max_matches: u8::MAX,
+        max_chunk: u16::MAX,
+        max_blob: u32::MAX,
     };
     let refusal = Refusal::WrongVersion {
         found: u8::MAX,
@@ -201,6 +349,18 @@ fn the_longest_messages_fit_a_frame() {
     let mut writer = FrameWriter::new();
     let measure = Request::Measure(vec(&[asked; MAX_MATCHES]));
     assert!(writer.seal(u16::MAX, &measure).is_some());
+    let chunk = Request::Chunk(Chunk {
+        offset: u32::MAX,
+        bytes: vec(&[0xff; MAX_CHUNK]),
+    });
+    assert!(writer.seal(u16::MAX, &chunk).is_some());
+    let begin = Request::BeginUpdate(NewBlob {
+        length: u32::MAX,
+        checksum: u32::MAX,
+        identity: [0xff; 16],
+        rig_serial: Some(name(&"n".repeat(MAX_NAME))),
+    });
+    assert!(writer.seal(u16::MAX, &begin).is_some());
     for reply in [
         Reply::Measured(vec(&[found; MAX_MATCHES])),
         Reply::Status(status),
@@ -239,7 +399,7 @@ fn a_refusal_for_want_of_a_blob_says_why() {
             },
             "damaged",
         ),
-        (OpenError::BadHeader, "cannot be opened (code 7)"),
+        (OpenError::BadHeader, "cannot be opened (code 7): flash one"),
     ] {
         let text = Refusal::NoBlob {
             open_error: error.code(),

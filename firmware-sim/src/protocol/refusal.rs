@@ -1,0 +1,251 @@
+//! Why a frame or a request was refused: facts on the wire, words and the next step in `Display`.
+
+use serde::{Deserialize, Serialize};
+
+/// Why a frame or a request was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Refusal {
+    /// More bytes than a frame may have came without a delimiter.
+    Oversized {
+        /// Most bytes between two delimiters.
+        limit: u16,
+    },
+    /// The bytes between two delimiters are no COBS encoding, or too few for a head and a checksum.
+    BadFrame,
+    /// The checksum does not match: the frame was damaged on its way.
+    BadChecksum,
+    /// The frame is whole, but of another protocol version.
+    WrongVersion {
+        /// The version in the frame.
+        found: u8,
+        /// The version spoken here.
+        supported: u8,
+    },
+    /// The frame is whole, but its body is no message known here.
+    UnknownMessage,
+    /// Nothing can be measured: no blob could be opened.
+    NoBlob {
+        /// The stable code of the runtime's `OpenError`.
+        open_error: u8,
+    },
+    /// The announced blob is longer than a slot.
+    TooLong {
+        /// Longest blob that a slot holds, bytes.
+        limit: u32,
+    },
+    /// A chunk does not start where the last one ended.
+    WrongOffset {
+        /// Where the next chunk starts.
+        expected: u32,
+    },
+    /// A chunk is empty, goes beyond the announced length, or ends inside a program unit.
+    BadChunk {
+        /// Bytes still missing.
+        missing: u32,
+    },
+    /// No update of this peer is under way: none was begun, it was finished or given up, another
+    /// peer took over, or the device restarted.
+    NoUpdate,
+    /// Not all bytes have arrived.
+    Incomplete {
+        /// Where the next chunk starts.
+        received: u32,
+    },
+    /// The stored bytes do not have the announced checksum.
+    ChecksumMismatch {
+        /// As announced.
+        announced: u32,
+        /// Of the bytes read back from flash.
+        stored: u32,
+    },
+    /// The runtime cannot open what was sent.
+    NotABlob {
+        /// The stable code of its `OpenError`.
+        open_error: u8,
+    },
+    /// The blob is of another calibration than announced.
+    OtherIdentity,
+    /// The blob was calibrated for other cameras than the device has.
+    OtherRig {
+        /// Which camera, from 0; of no meaning for the count and the serial number.
+        camera: u8,
+        /// What differs.
+        what: RigPart,
+        /// What the device has; 0 for a name or a serial number, which `status` lists.
+        expected: u32,
+        /// What the blob has; 0 for a name or a serial number.
+        found: u32,
+    },
+    /// The other slot holds no blob that can be used.
+    NothingToRollBackTo,
+    /// The other slot has no room for another commit record.
+    LogFull,
+    /// The flash failed.
+    FlashFailed {
+        /// What it was to do.
+        operation: FlashOperation,
+        /// Where, from the start of the flash.
+        address: u32,
+    },
+    /// Another peer's update is under way.
+    Busy {
+        /// It is given up unless it goes on within this time, ms.
+        wait_ms: u32,
+    },
+}
+
+/// What of a camera, or of the rig, is not the device's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum RigPart {
+    /// The number of cameras.
+    Count,
+    /// A camera's name.
+    Name,
+    /// A sensor's width, px.
+    Width,
+    /// A sensor's height, px.
+    Height,
+    /// The rig's serial number.
+    Serial,
+}
+
+/// What flash can fail to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum FlashOperation {
+    /// Reading.
+    Read,
+    /// Erasing a block.
+    Erase,
+    /// Programming a unit, or it reads otherwise afterwards.
+    Program,
+}
+
+impl core::fmt::Display for Refusal {
+    fn fmt(&self, out: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match *self {
+            Self::Oversized { limit } => write!(out, "the frame is longer than {limit} bytes"),
+            Self::BadFrame => write!(out, "the bytes are no frame"),
+            Self::BadChecksum => write!(out, "the frame was damaged on its way"),
+            Self::WrongVersion { found, supported } => write!(
+                out,
+                "the frame is of protocol version {found}, {supported} is spoken"
+            ),
+            Self::UnknownMessage => write!(out, "the frame holds no known message"),
+            Self::NoBlob { open_error } => {
+                // The codes are the runtime's; these are the ones that a user can act upon.
+                let reason = match open_error {
+                    2 => "its flash holds no blob",
+                    3 => "the blob in its flash is of a version that it does not read",
+                    5 => "the blob in its flash is damaged",
+                    _ => "the blob in its flash cannot be opened",
+                };
+                write!(out, "{reason} (code {open_error}): flash one first")
+            }
+            Self::TooLong { limit } => write!(
+                out,
+                "the blob is longer than a slot of its flash, {limit} bytes: pack it with a larger error bound"
+            ),
+            Self::WrongOffset { expected } => {
+                write!(out, "the next chunk starts at byte {expected}: go on there")
+            }
+            Self::BadChunk { missing } => write!(
+                out,
+                "the chunk is empty, too long or ends inside a program unit; {missing} bytes are missing"
+            ),
+            Self::NoUpdate => write!(
+                out,
+                "no update of yours is under way (another took over, or the device restarted): begin it again"
+            ),
+            Self::Incomplete { received } => {
+                write!(
+                    out,
+                    "only {received} bytes have arrived: send the rest first"
+                )
+            }
+            Self::ChecksumMismatch { announced, stored } => write!(
+                out,
+                "the stored bytes have the checksum {stored:08x}, not the announced {announced:08x}: send the blob again"
+            ),
+            Self::NotABlob { open_error } => {
+                let reason = match open_error {
+                    2 => "what was sent is no blob",
+                    3 => {
+                        "the blob is of a format version that the device does not read: bring its firmware up to date, or pack for that version"
+                    }
+                    5 => "the blob was damaged before it was sent: pack it again",
+                    _ => "what was sent cannot be opened as a blob: pack it again",
+                };
+                write!(out, "{reason} (code {open_error})")
+            }
+            Self::OtherIdentity => write!(
+                out,
+                "the blob is of another calibration than announced: send the file again"
+            ),
+            Self::OtherRig {
+                camera,
+                what,
+                expected,
+                found,
+            } => write_other_rig(out, camera, what, expected, found),
+            Self::NothingToRollBackTo => write!(
+                out,
+                "the other slot holds no whole blob: flash the one that you want"
+            ),
+            Self::LogFull => write!(
+                out,
+                "the other slot has no room for another commit: flash its blob again"
+            ),
+            Self::FlashFailed { operation, address } => {
+                let operation = match operation {
+                    FlashOperation::Read => "read",
+                    FlashOperation::Erase => "be erased",
+                    FlashOperation::Program => "be programmed",
+                };
+                write!(
+                    out,
+                    "its flash could not {operation} at {address:#x}: try again; if it fails again, the flash is worn out or write-protected"
+                )
+            }
+            Self::Busy { wait_ms } => write!(
+                out,
+                "somebody else is updating it: try again in {} s",
+                wait_ms.div_ceil(1000)
+            ),
+        }
+    }
+}
+
+fn write_other_rig(
+    out: &mut core::fmt::Formatter<'_>,
+    camera: u8,
+    what: RigPart,
+    expected: u32,
+    found: u32,
+) -> core::fmt::Result {
+    match what {
+        RigPart::Count => write!(
+            out,
+            "the blob is for another rig: it has {found} cameras, the device {expected}"
+        )?,
+        RigPart::Name => write!(
+            out,
+            "the blob is for another rig: its camera {camera} has another name"
+        )?,
+        RigPart::Width => write!(
+            out,
+            "the blob is for another rig: its camera {camera} is {found} px wide, the device's {expected} px"
+        )?,
+        RigPart::Height => write!(
+            out,
+            "the blob is for another rig: its camera {camera} is {found} px high, the device's {expected} px"
+        )?,
+        RigPart::Serial => write!(
+            out,
+            "the blob is for another rig: the device has another serial number"
+        )?,
+    }
+    write!(
+        out,
+        ". `status` lists the device's cameras; take the blob of this rig"
+    )
+}
