@@ -1,5 +1,5 @@
 /* How a device uses rays.h: opens the blob at the start of a flash sector, checks itself, and measures. It prints the bits of
- * 4000 random matches, so that targets can be compared. `print` and `flash` are the machine's: qemu.c or host.c. */
+ * 4000 random matches, and of projections and epipolar curves of some, so that targets can be compared. `print` and `flash` are the machine's: qemu.c or host.c. */
 #include "example.h"
 #include "rays.h"
 
@@ -42,6 +42,57 @@ static float random_px(int extent_px)
     return (float)(int32_t)((random_state >> 8) % (uint32_t)((extent_px + 1) << 14)) / 16384.0f - 1.0f;
 }
 
+/* Where the second camera would see the point of a match, and where the first pixel's ray runs there. */
+static void print_search(rays_sighting first, const rays_point *point)
+{
+    enum { STEPS = 8 };
+    rays_pixel pixel, near;
+    rays_curve_point curve[STEPS];
+    size_t found;
+    int code = rays_project(&rig, 1, point->point_mm, &pixel);
+    print_code(code);
+    if (code == RAYS_OK) {
+        print_bits(&pixel.u_px, 1);
+        print_bits(&pixel.v_px, 1);
+        pixel.u_px += 2.5f;
+        print_code(code = rays_project_near(&rig, 1, point->point_mm, pixel, &near));
+        if (code == RAYS_OK) {
+            print_bits(&near.u_px, 1);
+            print_bits(&near.v_px, 1);
+        }
+    }
+    print_code(code = rays_epipolar_curve(&rig, first, 1, 100.0f, 3000.0f, curve, STEPS, &found));
+    for (size_t k = 0; code == RAYS_OK && k < found; k++) {
+        print_bits(&curve[k].pixel.u_px, 1);
+        print_bits(&curve[k].pixel.v_px, 1);
+        print_bits(curve[k].point_mm, 3);
+    }
+}
+
+/* The rows below the middle of the second camera's sensor, two by two pixels joined. */
+static void print_window(void)
+{
+    rays_camera camera;
+    rays_window window;
+    int code = rays_camera_of(&rig, 1, &camera);
+    if (code == RAYS_OK) {
+        const uint32_t width = camera.sensor_width_px, height = camera.sensor_height_px;
+        const rays_readout readout = {{width, height}, {0, height / 2}, {width / 2, height / 4}, {2, 2}};
+        code = rays_window_of(&rig, 1, &readout, &window);
+    }
+    print("window");
+    print_code(code);
+    if (code == RAYS_OK) {
+        const rays_pixel image = {3.25f, 7.5f};
+        const rays_pixel sensor = rays_to_sensor(window, image), back = rays_from_sensor(window, sensor);
+        print_bits(&sensor.u_px, 1);
+        print_bits(&sensor.v_px, 1);
+        print_bits(&back.u_px, 1);
+        print_bits(&back.v_px, 1);
+    }
+    print("\n");
+}
+
 int example(void)
 {
     size_t length;
@@ -67,6 +118,7 @@ int example(void)
     if (code != RAYS_OK) {
         return 1;
     }
+    print_window();
     for (int k = 0; k < 4000; k++) {
         rays_sighting first = {0, 0, 0}, second = {1, 0, 0};
         first.u_px = random_px(64);
@@ -86,6 +138,9 @@ int example(void)
         if (code == RAYS_OK) {
             print_bits(point.point_mm, 3);
             print_bits(&point.gap_squared_mm2, 1);
+        }
+        if (code == RAYS_OK && k % 32 == 0) {
+            print_search(first, &point);
         }
         print_code(code = rays_triangulate_with_covariance(&rig, first, second, &measurement));
         if (code == RAYS_OK) {

@@ -44,6 +44,11 @@ enum {
     RAYS_NO_SUCH_CAMERA = 65,
     RAYS_PARALLEL = 67,        /* the rays are parallel within 0.0002 rad */
     RAYS_BEHIND = 68,          /* the rays meet behind a camera */
+    RAYS_UNSEEN = 69,          /* no pixel of the calibrated area was found to see the point */
+
+    /* Why an image has no window. */
+    RAYS_WRONG_SENSOR = 70,    /* calibrated on a sensor of another size; nothing is ever scaled */
+    RAYS_NOT_ON_SENSOR = 71,   /* an empty image, a binning of 0, or more than the sensor has */
 
     /* Of this interface. */
     RAYS_BAD_ARGUMENT = 128,   /* a null pointer, or a length that no object has */
@@ -55,6 +60,20 @@ enum {
 typedef struct {
     const void *opaque[32];
 } rays_rig;
+
+/* A place on a sensor or an image. */
+typedef struct {
+    float u_px;
+    float v_px;
+} rays_pixel;
+
+/* A camera of the blob. The name has name_len bytes of UTF-8 and no zero at its end; it lies in the blob. */
+typedef struct {
+    const char *name;
+    size_t name_len;
+    uint32_t sensor_width_px;
+    uint32_t sensor_height_px;
+} rays_camera;
 
 /* A pixel of a camera; cameras count from 0 in the order of the blob. */
 typedef struct {
@@ -84,6 +103,26 @@ typedef struct {
     int has_sigma;
 } rays_measurement;
 
+/* A point on the ray of a pixel, and where another camera sees it. */
+typedef struct {
+    rays_pixel pixel;
+    float point_mm[3];
+} rays_curve_point;
+
+/* What a camera reads out, in columns and rows: its whole sensor, the first pixel read, the image that comes out, and how many
+ * sensor pixels make one of the image's (1: no binning). */
+typedef struct {
+    uint32_t sensor_px[2];
+    uint32_t first_px[2];
+    uint32_t image_px[2];
+    uint32_t binning[2];
+} rays_readout;
+
+/* The map between an image and its sensor, made by rays_window_of. What is in it is the library's business. */
+typedef struct {
+    float opaque[6];
+} rays_window;
+
 /* How many of these bytes, a flash sector say, are the blob at their start. Only its first bytes are checked. */
 int rays_stated_len(const void *bytes, size_t length, uint32_t *stated_len);
 
@@ -93,6 +132,8 @@ int rays_open(rays_rig *rig, const void *blob, size_t length);
 /* 0 if the rig is not open. */
 size_t rays_camera_count(const rays_rig *rig);
 
+int rays_camera_of(const rays_rig *rig, size_t camera, rays_camera *info);
+
 int rays_lookup(const rays_rig *rig, rays_sighting sighting, rays_ray *ray);
 
 int rays_triangulate(const rays_rig *rig, rays_sighting first, rays_sighting second, rays_point *point);
@@ -100,6 +141,28 @@ int rays_triangulate(const rays_rig *rig, rays_sighting first, rays_sighting sec
 /* About three and a half times the work of rays_triangulate, whose bits the point has. */
 int rays_triangulate_with_covariance(const rays_rig *rig, rays_sighting first, rays_sighting second,
                                      rays_measurement *measurement);
+
+/* The pixel of a camera that sees a point of the rig's frame, to some 0.001 px; it costs 25 lookups and about ten for each of
+ * some six steps. */
+int rays_project(const rays_rig *rig, size_t camera, const float point_mm[3], rays_pixel *pixel);
+
+/* The same without the 25, from a pixel nearby: that of the frame before, say. */
+int rays_project_near(const rays_rig *rig, size_t camera, const float point_mm[3], rays_pixel start, rays_pixel *pixel);
+
+/* Where the ray of a pixel appears in another camera: from far_mm to near_mm along the ray, `count` points at equal steps of the
+ * inverse distance. `points` has room for all of them, at most 65535; *found becomes how many of them the other
+ * camera sees, which stand first, from far to near. */
+int rays_epipolar_curve(const rays_rig *rig, rays_sighting sighting, size_t other, float near_mm, float far_mm,
+                        rays_curve_point *points, size_t count, size_t *found);
+
+/* The map for a camera that reads out a part of its sensor, or bins it. */
+int rays_window_of(const rays_rig *rig, size_t camera, const rays_readout *readout, rays_window *window);
+
+/* The sensor's pixel at a pixel of the image: what rays_sighting wants. */
+rays_pixel rays_to_sensor(rays_window window, rays_pixel image);
+
+/* The image's pixel at a pixel of the sensor: what rays_project gave. */
+rays_pixel rays_from_sensor(rays_window window, rays_pixel sensor);
 
 /* Whether this target computes the bits that the packing host computed. `number`, which may be null, becomes how many tests
  * there are or, with RAYS_SELF_TEST_FAILED, the first that failed, counted from 0. */

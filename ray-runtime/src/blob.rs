@@ -228,15 +228,23 @@ impl<'a> RayBlob<'a> {
             let rays = (&ray_a.ray, &ray_b.ray);
             let by_a = meeting.by_shifts_of_first(rays.0, rays.1, ray_a.shifts_at(lambda_a));
             let by_b = meeting.by_shifts_of_second(rays.0, rays.1, ray_b.shifts_at(lambda_b));
-            let (pixel, [u1, v1], [u2, v2]) = if is_swapped {
+            let (pixel, by_first, by_second) = if is_swapped {
                 (b.1, by_b, by_a)
             } else {
                 (a.1, by_a, by_b)
             };
-            pair.covariance(pixel, &[u1, v1, u2, v2])
+            let ([u1, v1], [u2, v2]) = (by_first, by_second);
+            pair.covariance(
+                pixel,
+                &[u1, v1, u2, v2],
+                // Of the other sign with the cameras in the other order, as squares alone are taken.
+                meeting.gap_by_pixels(&by_first, &by_second),
+                meeting.gap_scale(),
+            )
         });
         Ok(Measurement {
             found: meeting.found,
+            is_second_above: meeting.is_along_normal,
             covariance,
         })
     }

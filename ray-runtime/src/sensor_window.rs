@@ -20,6 +20,8 @@ pub struct Readout {
 /// The center of the image's top-left pixel is (0, 0): that of the first `binning` sensor pixels. A
 /// smaller sensor, or one whose driver scales the image, is another camera: it needs a calibration of
 /// its own.
+// As C sees it, six numbers: the C interface passes it by value.
+#[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensorWindow {
     /// Sensor coordinates of the image's pixel (0, 0), px.

@@ -43,6 +43,8 @@ pub(crate) struct Meeting {
     pub found: Triangulation,
     /// Where it starts and ends: `origin + lambda * direction` of each ray.
     pub lambda: [f32; 2],
+    /// Whether it leads from the first ray to the second along the product of the two directions.
+    pub is_along_normal: bool,
     /// The product of the two directions, along it, and the inverse of its square.
     normal: Vector3<f32>,
     inverse: f32,
@@ -69,6 +71,23 @@ impl Meeting {
         shifts: [Vector3<f32>; 2],
     ) -> [Vector3<f32>; 2] {
         self.by_shifts(&b.direction, &-a.direction, shifts)
+    }
+
+    /// How the gap, with its sign, moves with the pixels that move the middle like this, times half of
+    /// the normal's length: a ray that goes out of the rays' plane takes the middle half of the way.
+    pub fn gap_by_pixels(
+        &self,
+        by_first: &[Vector3<f32>; 2],
+        by_second: &[Vector3<f32>; 2],
+    ) -> [f32; 4] {
+        let [u1, v1] = by_first.map(|by| -self.normal.dot(&by));
+        let [u2, v2] = by_second.map(|by| self.normal.dot(&by));
+        [u1, v1, u2, v2]
+    }
+
+    /// What a square of [`gap_by_pixels`](Self::gap_by_pixels) is multiplied with.
+    pub fn gap_scale(&self) -> f32 {
+        4.0 * self.inverse
     }
 
     fn by_shifts(
@@ -108,6 +127,7 @@ pub(crate) fn meet(a: &Ray, b: &Ray) -> Result<Meeting, MeasureError> {
             gap_squared_mm2: along * along * inverse,
         },
         lambda: [lambda1, lambda2],
+        is_along_normal: along >= 0.0,
         normal,
         inverse,
     })

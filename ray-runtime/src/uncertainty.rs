@@ -20,6 +20,10 @@ pub struct PointCovariance {
     pub calibration_mm2: Matrix3<f32>,
     /// From the noise of the measured pixels, if it is that of the calibration's corners, mm^2.
     pub noise_mm2: Matrix3<f32>,
+    /// Variance of the gap with its sign, from both together, mm^2. A gap whose square is often much more
+    /// says that the rig is no longer the calibrated one, or that pixels are off by more than the
+    /// calibration's corners were.
+    pub gap_mm2: f32,
 }
 
 impl PointCovariance {
@@ -40,8 +44,26 @@ impl PointCovariance {
 pub struct Measurement {
     /// The point and the gap.
     pub found: Triangulation,
+    /// The gap's sign: whether the second ray passes the first one on the side that the product of the
+    /// two directions, first by second, points to. For two cameras side by side, the first one on the
+    /// left, that is the upper side in the image.
+    pub is_second_above: bool,
     /// `None` where the blob carries no uncertainty of the two cameras.
     pub covariance: Option<PointCovariance>,
+}
+
+impl Measurement {
+    /// The gap with its sign, mm: positive if the second ray is above
+    /// ([`is_second_above`](Self::is_second_above)). Noise gives both signs alike, a rig that has moved
+    /// does not.
+    pub fn signed_gap_mm(&self) -> f32 {
+        let gap_mm = self.found.gap_mm();
+        if self.is_second_above {
+            gap_mm
+        } else {
+            -gap_mm
+        }
+    }
 }
 
 /// The uncertainty of one pair, borrowed from the blob.
@@ -116,11 +138,14 @@ impl<'a> Pair<'a> {
     }
 
     /// The covariance of a point: `by_pixels` says how it moves with the u and v of the pair's
-    /// first camera and of its second one, mm/px.
+    /// first camera and of its second one, mm/px. `gap_by_pixels` says it of the gap, in units whose
+    /// square is `gap_scale`.
     pub fn covariance(
         &self,
         pixel: PixelPoint,
         by_pixels: &[Vector3<f32>; 4],
+        gap_by_pixels: [f32; 4],
+        gap_scale: f32,
     ) -> Option<PointCovariance> {
         let [l11, l21, l22, l31, l32, l33, l41, l42, l43, l44] = self.factor_px(pixel)?;
         let [a, b, c, d] = by_pixels;
@@ -130,9 +155,19 @@ impl<'a> Pair<'a> {
             c * l33 + d * l43,
             d * l44,
         ];
+        let [e, f, g, h] = gap_by_pixels;
+        let gap_columns = [
+            e * l11 + f * l21 + g * l31 + h * l41,
+            f * l22 + g * l32 + h * l42,
+            g * l33 + h * l43,
+            h * l44,
+        ];
+        let squares = |[a, b, c, d]: [f32; 4]| a * a + b * b + c * c + d * d;
+        let noise_px2 = self.header.noise_px2;
         Some(PointCovariance {
             calibration_mm2: sum_of_squares(&columns, 1.0),
-            noise_mm2: sum_of_squares(by_pixels, self.header.noise_px2),
+            noise_mm2: sum_of_squares(by_pixels, noise_px2),
+            gap_mm2: (squares(gap_columns) + squares(gap_by_pixels) * noise_px2) * gap_scale,
         })
     }
 }
@@ -233,14 +268,20 @@ mod tests {
         let zero = Vector3::zeros();
         let by_pixels = [by_u, zero, -by_u, zero];
         let pixel = PixelPoint::new(12.0, 18.0);
-        let found = pair(&nodes).covariance(pixel, &by_pixels).unwrap();
+        let found = pair(&nodes).covariance(pixel, &by_pixels, [1.0, 2.0, -1.0, 2.0], 0.5);
+        let found = found.unwrap();
+        // Noise: 10 of 0.25 px^2; of the calibration nothing but the first row's difference.
+        assert_eq!(found.gap_mm2, 0.5 * 10.0 * 0.25);
         assert_eq!(found.calibration_mm2, Matrix3::zeros());
         // 2 coordinates of 0.25 px^2, 2 mm/px each.
         assert_eq!(found.noise_mm2.m11, 2.0);
         assert_eq!(found.sigma_mm(), [libm::sqrtf(2.0), 0.0, 0.0]);
         let same = [by_u, zero, by_u, zero];
-        let found = pair(&nodes).covariance(pixel, &same).unwrap();
+        let found = pair(&nodes).covariance(pixel, &same, [1.0, 0.0, 1.0, 0.0], 1.0);
+        let found = found.unwrap();
         assert!((found.calibration_mm2.m11 - 1.44).abs() < 1e-5);
+        // Twice 0.3 px together, and twice 0.25 px^2.
+        assert!((found.gap_mm2 - 0.86).abs() < 1e-5);
     }
 
     #[test]

@@ -2,8 +2,8 @@
 //! host and, where a cross compiler is there, on Arm in QEMU, with an FPU and without; a panic would not link.
 
 use ray_runtime::{
-    Aligned, LookupError, MeasureError, Measurement, OpenError, PixelPoint, Ray, RayBlob, Table,
-    Triangulation,
+    Aligned, EpipolarCurve, LookupError, MeasureError, Measurement, OpenError, PixelPoint,
+    ProjectError, Ray, RayBlob, Readout, ReadoutError, SensorWindow, Table, Triangulation,
 };
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -118,9 +118,10 @@ impl Pixels {
 fn expected(blob: &RayBlob<'_>) -> (String, usize) {
     let (cameras, tests) = (blob.camera_count(), blob.run_self_tests().unwrap());
     let mut text = format!("cameras {cameras:02x}, self-tests {tests:02x} passed\n");
+    text += &expected_window(blob);
     let mut pixels = Pixels(1);
     let mut points = 0;
-    for _ in 0..4000 {
+    for number in 0..4000 {
         let (first, second) = ((0, pixels.next()), (1, pixels.next()));
         let ray = blob.lookup(1, second.1).map_err(LookupError::code);
         let of_ray = |ray: Ray| {
@@ -135,6 +136,9 @@ fn expected(blob: &RayBlob<'_>) -> (String, usize) {
         let point = blob.triangulate(first, second);
         points += usize::from(point.is_ok());
         text += &field(point.map(of_point).map_err(MeasureError::code));
+        if let (Ok(point), 0) = (point, number % 32) {
+            text += &expected_search(blob, first, &point);
+        }
 
         let measured = blob.triangulate_with_covariance(first, second);
         let of_measurement = |measured: Measurement| {
@@ -145,6 +149,48 @@ fn expected(blob: &RayBlob<'_>) -> (String, usize) {
         text.push('\n');
     }
     (text, points)
+}
+
+/// What `print_search` must print.
+fn expected_search(
+    blob: &RayBlob<'_>,
+    first: (usize, PixelPoint),
+    point: &Triangulation,
+) -> String {
+    let of_pixel = |pixel: PixelPoint| vec![pixel.u, pixel.v];
+    let seen = |pixel: Result<PixelPoint, ProjectError>| {
+        field(pixel.map(of_pixel).map_err(ProjectError::code))
+    };
+    let pixel = blob.project(1, &point.point_mm);
+    let mut text = seen(pixel);
+    if let Ok(pixel) = pixel {
+        let start = PixelPoint::new(pixel.u + 2.5, pixel.v);
+        text += &seen(blob.project_near(1, &point.point_mm, start));
+    }
+    let of_curve = |curve: EpipolarCurve<'_>| {
+        curve
+            .flat_map(|at| [of_pixel(at.pixel), at.point_mm.as_slice().to_vec()].concat())
+            .collect()
+    };
+    let curve = blob.epipolar_curve(first, 1, [100.0, 3000.0], 8);
+    text + &field(curve.map(of_curve).map_err(MeasureError::code))
+}
+
+/// What `print_window` must print.
+fn expected_window(blob: &RayBlob<'_>) -> String {
+    let camera = blob.camera(1).unwrap();
+    let sensor @ [width, height] = [camera.sensor_width, camera.sensor_height];
+    let readout = Readout {
+        sensor,
+        first: [0, height / 2],
+        image: [width / 2, height / 4],
+        binning: [2, 2],
+    };
+    let window = SensorWindow::new(&camera, &readout).unwrap();
+    let sensor = window.to_sensor(PixelPoint::new(3.25, 7.5));
+    let back = window.from_sensor(sensor);
+    let bits = field(Ok(vec![sensor.u, sensor.v, back.u, back.v]));
+    format!("window{bits}\n")
 }
 
 /// An answer's bits behind a zero, or its code.
@@ -230,6 +276,18 @@ fn codes_of_the_header_are_those_of_rust() {
         ("PARALLEL", MeasureError::Parallel),
         ("BEHIND", MeasureError::Behind),
     ];
+    let others = [
+        ("UNSEEN", ProjectError::Unseen.code()),
+        (
+            "WRONG_SENSOR",
+            ReadoutError::WrongSensor {
+                calibrated: [0; 2],
+                found: [0; 2],
+            }
+            .code(),
+        ),
+        ("NOT_ON_SENSOR", ReadoutError::NotOnSensor.code()),
+    ];
     let of_c = [
         ("OK", 0),
         ("BAD_ARGUMENT", 128),
@@ -240,6 +298,7 @@ fn codes_of_the_header_are_those_of_rust() {
         .map(|(name, error)| (name, error.code()))
         .into_iter()
         .chain(measure.map(|(name, error)| (name, error.code())))
+        .chain(others)
         .chain(of_c)
         .map(|(name, code)| (format!("RAYS_{name}"), code))
         .collect();

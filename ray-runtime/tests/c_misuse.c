@@ -88,6 +88,38 @@ int main(int count, char **arguments)
     EXPECT(rays_triangulate_with_covariance(&rig, first, second, &measurement), RAYS_OK);
     EXPECT(measurement.has_sigma, 1);
 
+    /* Cameras, projections, curves, windows. */
+    rays_camera camera;
+    EXPECT(rays_camera_of(&rig, 2, &camera), RAYS_NO_SUCH_CAMERA);
+    EXPECT(rays_camera_of(&rig, 0, NULL), RAYS_BAD_ARGUMENT);
+    EXPECT(rays_camera_of(&rig, 1, &camera), RAYS_OK);
+    EXPECT(camera.name_len, 5);
+    EXPECT(memcmp(camera.name, "right", 5), 0);
+    rays_pixel pixel = {7.0f, 7.0f};
+    const float behind_mm[3] = {0.0f, 0.0f, -1e6f};
+    EXPECT(rays_project(&rig, 0, NULL, &pixel), RAYS_BAD_ARGUMENT);
+    EXPECT(rays_project(&rig, 0, behind_mm, NULL), RAYS_BAD_ARGUMENT);
+    EXPECT(rays_project(&rig, 0, behind_mm, &pixel), RAYS_UNSEEN);
+    EXPECT(rays_project(&rig, 2, measurement.point_mm, &pixel), RAYS_NO_SUCH_CAMERA);
+    EXPECT(pixel.u_px == 7.0f && pixel.v_px == 7.0f, 1);
+    EXPECT(rays_project(&rig, 0, measurement.point_mm, &pixel), RAYS_OK);
+    EXPECT(rays_project_near(&rig, 0, measurement.point_mm, pixel, &pixel), RAYS_OK);
+    rays_curve_point curve[4];
+    EXPECT(rays_epipolar_curve(&rig, first, 1, 100.0f, 900.0f, NULL, 4, &number), RAYS_BAD_ARGUMENT);
+    EXPECT(rays_epipolar_curve(&rig, first, 1, 100.0f, 900.0f, curve, 1 << 16, &number), RAYS_BAD_ARGUMENT);
+    EXPECT(rays_epipolar_curve(&rig, first, 2, 100.0f, 900.0f, curve, 4, &number), RAYS_NO_SUCH_CAMERA);
+    EXPECT(rays_epipolar_curve(&rig, first, 1, -1.0f, 900.0f, curve, 4, &number), RAYS_OK);
+    EXPECT(number, 0);
+    rays_readout readout = {{64, 48}, {8, 0}, {56, 48}, {1, 1}};
+    rays_window window;
+    EXPECT(rays_window_of(&rig, 0, NULL, &window), RAYS_BAD_ARGUMENT);
+    EXPECT(rays_window_of(&rig, 0, &readout, &window), RAYS_OK);
+    EXPECT(rays_to_sensor(window, pixel).u_px == pixel.u_px + 8.0f, 1);
+    readout.first_px[0] = 9;
+    EXPECT(rays_window_of(&rig, 0, &readout, &window), RAYS_NOT_ON_SENSOR);
+    readout.sensor_px[0] = 65;
+    EXPECT(rays_window_of(&rig, 0, &readout, &window), RAYS_WRONG_SENSOR);
+
     /* A failed opening closes a rig. */
     EXPECT(rays_open(&rig, bytes, 8), RAYS_TRUNCATED);
     EXPECT(rays_lookup(&rig, first, &ray), RAYS_NOT_OPEN);

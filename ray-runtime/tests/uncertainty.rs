@@ -3,7 +3,7 @@
 mod common;
 
 use common::{TestBlob, TestCamera, TestPair, encoding};
-use nalgebra::{Matrix3, Matrix3x4, Matrix4, Vector3};
+use nalgebra::{Matrix3, Matrix4, Vector3};
 use ray_runtime::format::Form;
 use ray_runtime::{MeasureError, PixelPoint, RayBlob};
 
@@ -86,15 +86,18 @@ fn at([u, v]: [f32; 2]) -> PixelPoint {
     PixelPoint::new(u, v)
 }
 
-/// How the point moves with the four coordinates, mm/px, by differences in f64 of f32 points.
-fn by_differences(blob: &RayBlob<'_>, pixels: [[f32; 2]; 2]) -> Matrix3x4<f64> {
+/// How the point, and the gap with its sign, move with the four coordinates, mm/px, by differences in f64
+/// of f32 points.
+fn by_differences(blob: &RayBlob<'_>, pixels: [[f32; 2]; 2]) -> Matrix4<f64> {
     // 1/8 px: a point's f32 step of 3e-5 mm makes 1.2e-4 mm/px.
     const H: f32 = 0.125;
     let point = |pixels: [[f32; 2]; 2]| {
-        let found = blob.triangulate((0, at(pixels[0])), (1, at(pixels[1])));
-        found.unwrap().point_mm.cast::<f64>()
+        let found = blob.triangulate_with_covariance((0, at(pixels[0])), (1, at(pixels[1])));
+        let found = found.unwrap();
+        let gap_mm = f64::from(found.signed_gap_mm());
+        found.found.point_mm.cast::<f64>().push(gap_mm)
     };
-    Matrix3x4::from_columns(&[0, 1, 2, 3].map(|k| {
+    Matrix4::from_columns(&[0, 1, 2, 3].map(|k| {
         let mut moved = [pixels, pixels];
         moved[0][k / 2][k % 2] -= H;
         moved[1][k / 2][k % 2] += H;
@@ -134,7 +137,13 @@ fn covariance_is_carried(form: Form) {
         // The bits of the point are those of the plain question.
         assert_eq!(Ok(measured.found), blob.triangulate(a, b));
         let covariance = measured.covariance.unwrap();
-        let by_pixels = by_differences(&blob, pixels);
+        let of_all = by_differences(&blob, pixels);
+        let gap_by_pixels = of_all.row(3);
+        let gap_mm2 =
+            (gap_by_pixels * factor()).norm_squared() + gap_by_pixels.norm_squared() * 0.01;
+        let error = f64::from(covariance.gap_mm2) / gap_mm2 - 1.0;
+        assert!(error.abs() < 5e-3, "gap: {error}");
+        let by_pixels = of_all.fixed_rows::<3>(0);
         let carried = by_pixels * factor();
         assert_near(
             &covariance.calibration_mm2,
@@ -161,6 +170,14 @@ fn the_order_of_the_cameras_does_not_matter() {
         let difference =
             one.covariance.unwrap().total_mm2() - other.covariance.unwrap().total_mm2();
         assert!(difference.norm() < 1e-5 * one.covariance.unwrap().total_mm2().norm());
+        let [gap, other_gap] = [one, other].map(|m| m.covariance.unwrap().gap_mm2);
+        assert!((gap - other_gap).abs() < 1e-5 * gap);
+        // A tenth of a pixel lower, the second ray passes below the first, whichever is asked first.
+        let lower = (1, at([second[0], second[1] + 0.1]));
+        for (a, b) in [(a, lower), (lower, a)] {
+            let below = blob.triangulate_with_covariance(a, b).unwrap();
+            assert!(below.signed_gap_mm() < -0.01, "{below:?}");
+        }
     }
 }
 

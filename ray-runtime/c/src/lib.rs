@@ -9,9 +9,12 @@
 
 #![no_std]
 
-use core::ffi::c_int;
+use core::ffi::{c_char, c_int};
 use core::mem::MaybeUninit;
-use ray_runtime::{MeasureError, OpenError, PixelPoint, RayBlob};
+use nalgebra::Vector3;
+use ray_runtime::{
+    MeasureError, OpenError, PixelPoint, ProjectError, RayBlob, Readout, SensorWindow,
+};
 
 /// Done.
 pub const OK: c_int = 0;
@@ -50,6 +53,40 @@ pub struct Sighting {
     camera: usize,
     u_px: f32,
     v_px: f32,
+}
+
+/// A place on a sensor or an image.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct Pixel {
+    u_px: f32,
+    v_px: f32,
+}
+
+/// A camera of the blob.
+#[repr(C)]
+pub struct Camera {
+    name: *const c_char,
+    name_len: usize,
+    sensor_width_px: u32,
+    sensor_height_px: u32,
+}
+
+/// A point on the ray of a pixel, and where another camera sees it.
+#[repr(C)]
+pub struct CurvePoint {
+    pixel: Pixel,
+    point_mm: [f32; 3],
+}
+
+/// What a camera reads out.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct CameraReadout {
+    sensor_px: [u32; 2],
+    first_px: [u32; 2],
+    image_px: [u32; 2],
+    binning: [u32; 2],
 }
 
 /// A ray, rig frame.
@@ -140,6 +177,29 @@ pub unsafe extern "C" fn rays_camera_count(rig: *const Rig) -> usize {
     unsafe { blob(rig) }.map_or(0, |blob| blob.camera_count())
 }
 
+/// A camera's name and size.
+///
+/// # Safety
+/// As `rays.h` says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rays_camera_of(
+    rig: *const Rig,
+    camera: usize,
+    info: *mut Camera,
+) -> c_int {
+    let ask = |blob: &RayBlob<'_>| {
+        let found = blob.camera(camera).ok_or_else(|| no_camera(blob, camera))?;
+        Ok(Camera {
+            name: found.name.as_ptr().cast(),
+            name_len: found.name.len(),
+            sensor_width_px: found.sensor_width,
+            sensor_height_px: found.sensor_height,
+        })
+    };
+    // SAFETY: both are null or what they should be, says the caller.
+    unsafe { answer(rig, info, ask) }
+}
+
 /// The ray of a pixel.
 ///
 /// # Safety
@@ -206,6 +266,130 @@ pub unsafe extern "C" fn rays_triangulate_with_covariance(
     unsafe { answer(rig, measurement, ask) }
 }
 
+/// The pixel that sees a point.
+///
+/// # Safety
+/// As `rays.h` says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rays_project(
+    rig: *const Rig,
+    camera: usize,
+    point_mm: *const [f32; 3],
+    pixel: *mut Pixel,
+) -> c_int {
+    // SAFETY: null or what they should be, says the caller.
+    unsafe {
+        project(rig, point_mm, pixel, |blob, point_mm| {
+            blob.project(camera, point_mm)
+        })
+    }
+}
+
+/// The pixel that sees a point, sought from one nearby.
+///
+/// # Safety
+/// As `rays.h` says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rays_project_near(
+    rig: *const Rig,
+    camera: usize,
+    point_mm: *const [f32; 3],
+    start: Pixel,
+    pixel: *mut Pixel,
+) -> c_int {
+    // SAFETY: null or what they should be, says the caller.
+    unsafe {
+        project(rig, point_mm, pixel, |blob, point_mm| {
+            blob.project_near(camera, point_mm, start.into())
+        })
+    }
+}
+
+/// Where the ray of a pixel appears in another camera.
+///
+/// # Safety
+/// As `rays.h` says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rays_epipolar_curve(
+    rig: *const Rig,
+    sighting: Sighting,
+    other: usize,
+    near_mm: f32,
+    far_mm: f32,
+    points: *mut CurvePoint,
+    count: usize,
+    found: *mut usize,
+) -> c_int {
+    let Ok(count) = u16::try_from(count) else {
+        return BAD_ARGUMENT;
+    };
+    if points.is_null() {
+        return BAD_ARGUMENT;
+    }
+    // SAFETY: not null, hence room for `count` points, says the caller. Nothing is read.
+    let points = unsafe {
+        core::slice::from_raw_parts_mut(points.cast::<MaybeUninit<CurvePoint>>(), count.into())
+    };
+    let ask = |blob: &RayBlob<'_>| {
+        let range_mm = [near_mm, far_mm];
+        let curve = blob
+            .epipolar_curve(sighting.of_rust(), other, range_mm, count)
+            .map_err(MeasureError::code)?;
+        let mut number = 0;
+        for (place, point) in points.iter_mut().zip(curve) {
+            place.write(CurvePoint {
+                pixel: point.pixel.into(),
+                point_mm: point.point_mm.into(),
+            });
+            number += 1;
+        }
+        Ok(number)
+    };
+    // SAFETY: both are null or what they should be, says the caller.
+    unsafe { answer(rig, found, ask) }
+}
+
+/// The map of a camera's readout.
+///
+/// # Safety
+/// As `rays.h` says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rays_window_of(
+    rig: *const Rig,
+    camera: usize,
+    readout: *const CameraReadout,
+    window: *mut SensorWindow,
+) -> c_int {
+    // SAFETY: null or a readout, says the caller.
+    let Some(readout) = (unsafe { readout.as_ref() }) else {
+        return BAD_ARGUMENT;
+    };
+    let readout = Readout {
+        sensor: readout.sensor_px,
+        first: readout.first_px,
+        image: readout.image_px,
+        binning: readout.binning,
+    };
+    let ask = |blob: &RayBlob<'_>| {
+        let camera = blob.camera(camera).ok_or_else(|| no_camera(blob, camera))?;
+        SensorWindow::new(&camera, &readout).map_err(|error| error.code())
+    };
+    // SAFETY: both are null or what they should be, says the caller.
+    unsafe { answer(rig, window, ask) }
+}
+
+/// The sensor's pixel at a pixel of the image.
+#[unsafe(no_mangle)]
+pub extern "C" fn rays_to_sensor(window: SensorWindow, image: Pixel) -> Pixel {
+    window.to_sensor(image.into()).into()
+}
+
+/// The image's pixel at a pixel of the sensor.
+#[unsafe(no_mangle)]
+pub extern "C" fn rays_from_sensor(window: SensorWindow, sensor: Pixel) -> Pixel {
+    window.from_sensor(sensor.into()).into()
+}
+
 /// Runs the blob's self-tests.
 ///
 /// # Safety
@@ -229,6 +413,27 @@ pub unsafe extern "C" fn rays_self_test(rig: *const Rig, number: *mut usize) -> 
         unsafe { number.write(count) };
     }
     code
+}
+
+/// The code of a camera that is none.
+fn no_camera(blob: &RayBlob<'_>, camera: usize) -> u8 {
+    let count = blob.camera_count();
+    ProjectError::NoSuchCamera { camera, count }.code()
+}
+
+impl From<PixelPoint> for Pixel {
+    fn from(pixel: PixelPoint) -> Self {
+        Self {
+            u_px: pixel.u,
+            v_px: pixel.v,
+        }
+    }
+}
+
+impl From<Pixel> for PixelPoint {
+    fn from(pixel: Pixel) -> Self {
+        Self::new(pixel.u_px, pixel.v_px)
+    }
 }
 
 impl Sighting {
@@ -267,6 +472,28 @@ unsafe fn blob<'a>(rig: *const Rig) -> Option<&'a RayBlob<'static>> {
     Some(unsafe { opened.blob.assume_init_ref() })
 }
 
+/// Asks for the pixel of a point.
+///
+/// # Safety
+/// As for [`answer`], and `point_mm` is null or three numbers.
+unsafe fn project(
+    rig: *const Rig,
+    point_mm: *const [f32; 3],
+    pixel: *mut Pixel,
+    ask: impl FnOnce(&RayBlob<'_>, &Vector3<f32>) -> Result<PixelPoint, ProjectError>,
+) -> c_int {
+    // SAFETY: null or three numbers, says the caller.
+    let Some(point_mm) = (unsafe { point_mm.as_ref() }) else {
+        return BAD_ARGUMENT;
+    };
+    let ask = |blob: &RayBlob<'_>| {
+        let found = ask(blob, &Vector3::from(*point_mm));
+        found.map(Pixel::from).map_err(ProjectError::code)
+    };
+    // SAFETY: the caller's word.
+    unsafe { answer(rig, pixel, ask) }
+}
+
 /// Asks the rig's blob and writes the answer, or leaves its place as it is; the code.
 ///
 /// # Safety
@@ -274,7 +501,7 @@ unsafe fn blob<'a>(rig: *const Rig) -> Option<&'a RayBlob<'static>> {
 unsafe fn answer<T>(
     rig: *const Rig,
     place: *mut T,
-    ask: impl Fn(&RayBlob<'_>) -> Result<T, u8>,
+    ask: impl FnOnce(&RayBlob<'_>) -> Result<T, u8>,
 ) -> c_int {
     if rig.is_null() || place.is_null() {
         return BAD_ARGUMENT;

@@ -6,8 +6,9 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
+use nalgebra::Vector3;
 use ray_runtime::format::{CRC_OFFSET, Form, checksum};
-use ray_runtime::{PixelPoint, RayBlob};
+use ray_runtime::{Camera, PixelPoint, RayBlob, Readout, SensorWindow};
 
 /// Longest input that is looked at, bytes.
 const MAX_LEN: usize = 1 << 16;
@@ -63,6 +64,7 @@ fn ask_everything(blob: &RayBlob<'_>) {
         let camera = blob.camera(index).expect("it is below the count");
         assert_eq!(blob.camera_index(camera.name), Some(index));
         let region = camera.region;
+        ask_window(&camera);
         let edges = |first: u32, extent: u32| {
             let (low, high) = (first as f32 - 0.5, (first + extent) as f32 - 0.5);
             [
@@ -104,10 +106,43 @@ fn ask_everything(blob: &RayBlob<'_>) {
                 bits(measured.found.point_mm.into())
             );
             let _ = measured.covariance.map(|covariance| covariance.sigma_mm());
+            // Twice at most: a projection costs as much as a hundred points.
+            if k % 32 == 0 {
+                ask_back(blob, a, b.0, &point.point_mm);
+            }
         }
     }
     let _ = blob.triangulate_many(&seen[..seen.len().min(5)]);
     let _ = blob.uncertain_pairs().count();
     let _ = blob.run_self_tests();
     let _ = (blob.identity(), blob.frame(), blob.written_by(), blob.len());
+}
+
+/// Where another camera sees a point, and a pixel's ray.
+fn ask_back(blob: &RayBlob<'_>, seen: (usize, PixelPoint), other: usize, point_mm: &Vector3<f32>) {
+    if let Ok(pixel) = blob.project(other, point_mm) {
+        assert!(blob.is_calibrated(other, pixel));
+        // One step from where the last one was too short to matter: found or lost, but no panic.
+        let _ = blob.project_near(other, point_mm, pixel);
+    }
+    let curve = blob.epipolar_curve(seen, other, [50.0, 5000.0], 4);
+    let curve = curve.expect("both were looked up");
+    for point in curve {
+        assert!(blob.is_calibrated(other, point.pixel));
+    }
+}
+
+/// The half of a sensor behind its middle, pixels joined by two.
+fn ask_window(camera: &Camera<'_>) {
+    let sensor = [camera.sensor_width, camera.sensor_height];
+    let readout = Readout {
+        sensor,
+        first: sensor.map(|extent| extent / 2),
+        image: sensor.map(|extent| (extent / 4).max(1)),
+        binning: [2, 2],
+    };
+    if let Ok(window) = SensorWindow::new(camera, &readout) {
+        let sensor = window.to_sensor(PixelPoint::new(0.0, 0.0));
+        assert!(sensor.u >= 0.0 && sensor.v >= 0.0);
+    }
 }
