@@ -5,6 +5,7 @@ pub mod app;
 pub mod cobs;
 pub mod counting;
 pub mod frame;
+pub mod health;
 pub mod port;
 pub mod protocol;
 pub mod random;
