@@ -1,87 +1,27 @@
 //! The workstation's side: a device as something that can be asked.
 
+mod error;
+mod flash;
+#[cfg(feature = "serial")]
+mod serial;
+mod transport;
+
 use std::collections::VecDeque;
-use std::io::{ErrorKind, Read, Write};
-use std::net::{TcpStream, ToSocketAddrs};
+use std::io::ErrorKind;
 use std::time::{Duration, Instant};
 
-use thiserror::Error;
-
 use crate::frame::{DELIMITER, FrameReader, FrameWriter, NO_SEQUENCE, Received, Rejected};
-use crate::protocol::{Hello, MAX_MATCHES, Match, Measured, Refusal, Reply, Request, Status};
+use crate::protocol::{
+    Hello, MAX_MATCHES, Match, Measured, Refusal, Reply, Request, SelfTestReport, Status,
+    StoredBlob,
+};
+
+pub use error::ClientError;
+pub use flash::{Begun, FlashOptions, FlashProgress, Flashed};
+pub use transport::Transport;
 
 /// How long an answer may take, unless said otherwise.
 pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(5);
-
-/// Batches under way at once: enough to hide the link's delay, few enough that neither side's
-/// socket buffer fills up while the other is still sending.
-const WINDOW: usize = 8;
-
-/// Why a device gave no answer, or not the one asked for.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum ClientError {
-    /// The address is of no known kind.
-    #[error("`{address}` is no device address: give tcp:HOST:PORT, such as tcp:127.0.0.1:7777")]
-    UnknownAddress {
-        /// As given.
-        address: String,
-    },
-    /// Nobody listens there.
-    #[error("no device at {address}: is it running, and is the port right?")]
-    Connect {
-        /// As given.
-        address: String,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The connection broke.
-    #[error("the connection to {address} broke")]
-    Broken {
-        /// As given.
-        address: String,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The device closed the connection.
-    #[error("the device at {address} closed the connection")]
-    Closed {
-        /// As given.
-        address: String,
-    },
-    /// No answer came in time.
-    #[error(
-        "no answer from {address} within {} s: is it a device of this kind, and is nobody else connected to it?",
-        timeout.as_secs_f32()
-    )]
-    Timeout {
-        /// As given.
-        address: String,
-        /// How long was waited.
-        timeout: Duration,
-    },
-    /// The device speaks another version of the protocol.
-    #[error(
-        "the device speaks protocol version {device}, this program version {ours}: bring the older one up to date"
-    )]
-    WrongVersion {
-        /// The device's version.
-        device: u8,
-        /// The version spoken here.
-        ours: u8,
-    },
-    /// The device refused the request.
-    #[error("the device refused: {0}")]
-    Refused(Refusal),
-    /// What came back is no answer to what was asked, or cannot be read.
-    #[error("the device's answer to {asked} makes no sense: {found}")]
-    BadReply {
-        /// The request.
-        asked: &'static str,
-        /// What came instead.
-        found: String,
-    },
-}
 
 /// A connection to a device.
 ///
@@ -99,18 +39,21 @@ pub enum ClientError {
 #[derive(Debug)]
 pub struct DeviceClient {
     address: String,
-    stream: TcpStream,
+    /// `None` only between the end of one connection and the start of the next.
+    transport: Option<Box<dyn Transport>>,
     timeout: Duration,
     arrived: VecDeque<u8>,
     reader: FrameReader,
     writer: FrameWriter,
     last_sequence: u16,
-    batch_length: usize,
+    greeting: Hello,
+    /// Bytes that came since the connection was made.
+    heard: usize,
 }
 
 impl DeviceClient {
-    /// Connects to `address`, `tcp:HOST:PORT`, and makes sure that a device of this protocol
-    /// version answers.
+    /// Connects to `address`, `tcp:HOST:PORT` or `serial:PORT[@BAUD]`, and makes sure that a device
+    /// of this protocol version answers.
     ///
     /// # Errors
     /// [`ClientError`], after [`DEFAULT_TIMEOUT`] at the latest.
@@ -123,37 +66,67 @@ impl DeviceClient {
     /// # Errors
     /// [`ClientError`].
     pub fn connect_within(address: &str, timeout: Duration) -> Result<Self, ClientError> {
-        let unknown = || ClientError::UnknownAddress {
-            address: address.to_owned(),
-        };
-        let host_and_port = address.strip_prefix("tcp:").ok_or_else(unknown)?;
-        if host_and_port
-            .rsplit_once(':')
-            .is_none_or(|(_, port)| port.parse::<u16>().is_err())
-        {
-            return Err(unknown());
-        }
-        let stream =
-            connect_tcp(host_and_port, timeout).map_err(|source| ClientError::Connect {
-                address: address.to_owned(),
-                source,
-            })?;
         let mut client = Self {
             address: address.to_owned(),
-            stream,
+            transport: None,
             timeout,
             arrived: VecDeque::new(),
             reader: FrameReader::new(),
             writer: FrameWriter::new(),
             last_sequence: NO_SEQUENCE,
-            batch_length: MAX_MATCHES,
+            greeting: Hello::default(),
+            heard: 0,
         };
+        client.reconnect()?;
+        Ok(client)
+    }
+
+    /// Talks over a link of another kind, on which a device answers already. It cannot be opened
+    /// again when it breaks.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn over(link: Box<dyn Transport>, timeout: Duration) -> Result<Self, ClientError> {
+        let mut client = Self {
+            address: "this link".to_owned(),
+            transport: Some(link),
+            timeout,
+            arrived: VecDeque::new(),
+            reader: FrameReader::new(),
+            writer: FrameWriter::new(),
+            last_sequence: NO_SEQUENCE,
+            greeting: Hello::default(),
+            heard: 0,
+        };
+        client.start_over()?;
+        Ok(client)
+    }
+
+    /// What the device said of itself and its limits when the connection was made.
+    pub fn greeting(&self) -> &Hello {
+        &self.greeting
+    }
+
+    /// Drops the connection, if there still is one, and makes another.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn reconnect(&mut self) -> Result<(), ClientError> {
+        // The old one first: a serial port can be open only once.
+        self.transport = None;
+        self.transport = Some(transport::open(&self.address, self.timeout)?);
+        self.start_over()
+    }
+
+    fn start_over(&mut self) -> Result<(), ClientError> {
+        self.arrived.clear();
+        self.heard = 0;
+        self.reader = FrameReader::new();
         // Ends what an earlier peer may have left unfinished; the device refuses it, and `greet`
         // skips that refusal.
-        client.send_bytes(&[DELIMITER])?;
-        let hello = client.greet()?;
-        client.batch_length = usize::from(hello.max_matches).clamp(1, MAX_MATCHES);
-        Ok(client)
+        self.send_bytes(&[DELIMITER])?;
+        self.greeting = self.greet()?;
+        Ok(())
     }
 
     /// Who the device is.
@@ -178,6 +151,29 @@ impl DeviceClient {
         }
     }
 
+    /// Makes the blob of the other slot active, after the device has checked all of it.
+    ///
+    /// # Errors
+    /// [`ClientError`]; [`Refusal::NothingToRollBackTo`] inside it if there is none.
+    pub fn rollback(&mut self) -> Result<StoredBlob, ClientError> {
+        match self.ask(&Request::Rollback)? {
+            Reply::Active(stored) => Ok(stored),
+            reply => Err(unexpected("rollback", &reply)),
+        }
+    }
+
+    /// Has the device compare the self-tests in its blob: bits that the packing host computed.
+    ///
+    /// # Errors
+    /// [`ClientError`]; [`Refusal::NoBlob`] inside it if there is nothing to test. A test that fails
+    /// is no error here but a number in the report.
+    pub fn self_test(&mut self) -> Result<SelfTestReport, ClientError> {
+        match self.ask(&Request::SelfTest)? {
+            Reply::SelfTested(report) => Ok(report),
+            reply => Err(unexpected("self-test", &reply)),
+        }
+    }
+
     /// Has the device triangulate `matches`; one answer each, in the same order.
     ///
     /// They travel in batches, several of which are under way at once.
@@ -187,10 +183,12 @@ impl DeviceClient {
     /// match that the device cannot triangulate is no error here but an outcome of its own.
     pub fn measure(&mut self, matches: &[Match]) -> Result<Vec<Measured>, ClientError> {
         let mut measured = Vec::with_capacity(matches.len());
-        let mut under_way = VecDeque::with_capacity(WINDOW);
-        let mut batches = matches.chunks(self.batch_length);
+        let batch_length = usize::from(self.greeting.max_matches).clamp(1, MAX_MATCHES);
+        let window = self.window();
+        let mut under_way = VecDeque::with_capacity(window);
+        let mut batches = matches.chunks(batch_length);
         loop {
-            while under_way.len() < WINDOW
+            while under_way.len() < window
                 && let Some(batch) = batches.next()
             {
                 let batch_on_wire = batch.iter().copied().collect();
@@ -227,8 +225,20 @@ impl DeviceClient {
     fn greet(&mut self) -> Result<Hello, ClientError> {
         let sequence = self.send(&Request::Hello)?;
         let deadline = Instant::now() + self.timeout;
+        let mut is_device = false;
         loop {
-            match self.next_frame(deadline)? {
+            let frame = match self.next_frame(deadline) {
+                Err(ClientError::Timeout { .. } | ClientError::Closed { .. })
+                    if self.heard > 0 && !is_device =>
+                {
+                    return Err(ClientError::NotADevice {
+                        address: self.address.clone(),
+                        bytes: self.heard,
+                    });
+                }
+                frame => frame?,
+            };
+            match frame {
                 Ok(Received {
                     sequence: found,
                     body: Reply::Hello(hello),
@@ -248,7 +258,8 @@ impl DeviceClient {
                         ours: supported,
                     });
                 }
-                Ok(_) | Err(_) => {}
+                Ok(_) => is_device = true,
+                Err(_) => {}
             }
         }
     }
@@ -258,41 +269,45 @@ impl DeviceClient {
         self.receive(sequence)
     }
 
+    /// How many requests may be under way at once.
+    fn window(&self) -> usize {
+        self.transport
+            .as_ref()
+            .map_or(1, |transport| transport.window().max(1))
+    }
+
     fn send(&mut self, request: &Request) -> Result<u16, ClientError> {
         self.last_sequence = self.last_sequence.checked_add(1).unwrap_or(NO_SEQUENCE + 1);
         let Some(frame) = self.writer.seal(self.last_sequence, request) else {
             return Err(ClientError::Refused(Refusal::BadFrame));
         };
-        let sent = self.stream.write_all(frame);
+        let sent = write(self.transport.as_mut(), frame);
         sent.map_err(|source| self.broken(source))?;
         Ok(self.last_sequence)
     }
 
-    /// The reply to the request of this number; replies come in the order of the requests.
+    /// The reply to the request of this number. Replies come in the order of the requests; those to
+    /// requests whose answers nobody waits for any more are skipped.
     fn receive(&mut self, sequence: u16) -> Result<Reply, ClientError> {
         let deadline = Instant::now() + self.timeout;
-        match self.next_frame(deadline)? {
-            Ok(Received {
-                body: Reply::Refused(refusal),
-                ..
-            }) => Err(refused(refusal)),
-            Ok(Received {
-                sequence: found,
-                body,
-            }) if found == sequence => Ok(body),
-            Ok(Received {
-                sequence: found, ..
-            }) => {
-                let found = format!("number {found} was answered instead of {sequence}");
-                Err(ClientError::BadReply {
-                    asked: "a request",
-                    found,
-                })
+        loop {
+            match self.next_frame(deadline)? {
+                Ok(Received {
+                    sequence: found,
+                    body: Reply::Refused(refusal),
+                }) if found == sequence || found == NO_SEQUENCE => return Err(refused(refusal)),
+                Ok(Received {
+                    sequence: found,
+                    body,
+                }) if found == sequence => return Ok(body),
+                Ok(_) => {}
+                Err(Rejected { refusal, .. }) => {
+                    return Err(ClientError::BadReply {
+                        asked: "a request",
+                        found: refusal.to_string(),
+                    });
+                }
             }
-            Err(Rejected { refusal, .. }) => Err(ClientError::BadReply {
-                asked: "a request",
-                found: refusal.to_string(),
-            }),
         }
     }
 
@@ -311,21 +326,19 @@ impl DeviceClient {
                 return Err(self.timed_out());
             }
             let mut buffer = [0; 8192];
-            let read = self
-                .stream
-                .set_read_timeout(Some(remaining))
-                .and_then(|()| self.stream.read(&mut buffer));
+            let read = match &mut self.transport {
+                Some(transport) => transport.read(&mut buffer, remaining),
+                None => Ok(0),
+            };
             match read {
                 Ok(0) => {
                     return Err(ClientError::Closed {
                         address: self.address.clone(),
                     });
                 }
-                Ok(count) => self.arrived.extend(&buffer[..count]),
-                Err(error)
-                    if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) =>
-                {
-                    return Err(self.timed_out());
+                Ok(count) => {
+                    self.heard = self.heard.saturating_add(count);
+                    self.arrived.extend(&buffer[..count]);
                 }
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(source) => return Err(self.broken(source)),
@@ -334,9 +347,7 @@ impl DeviceClient {
     }
 
     fn send_bytes(&mut self, bytes: &[u8]) -> Result<(), ClientError> {
-        self.stream
-            .write_all(bytes)
-            .map_err(|source| self.broken(source))
+        write(self.transport.as_mut(), bytes).map_err(|source| self.broken(source))
     }
 
     fn timed_out(&self) -> ClientError {
@@ -357,22 +368,11 @@ impl DeviceClient {
     }
 }
 
-/// Tries every address that the name stands for; the last failure counts.
-fn connect_tcp(host_and_port: &str, timeout: Duration) -> std::io::Result<TcpStream> {
-    let mut failure = std::io::Error::new(ErrorKind::NotFound, "the name stands for no address");
-    for address in host_and_port.to_socket_addrs()? {
-        match TcpStream::connect_timeout(&address, timeout) {
-            Ok(stream) => {
-                // Without this, each question waits for the acknowledgement of the one before: 47
-                // ms instead of 2.
-                stream.set_nodelay(true)?;
-                stream.set_write_timeout(Some(timeout))?;
-                return Ok(stream);
-            }
-            Err(error) => failure = error,
-        }
+fn write(transport: Option<&mut Box<dyn Transport>>, bytes: &[u8]) -> std::io::Result<()> {
+    match transport {
+        Some(transport) => transport.write_all(bytes),
+        None => Err(ErrorKind::NotConnected.into()),
     }
-    Err(failure)
 }
 
 fn refused(refusal: Refusal) -> ClientError {

@@ -224,7 +224,7 @@ impl Point {
 }
 
 /// Who the device is and what it takes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Hello {
     /// What kind of device this is.
     pub device: Name,

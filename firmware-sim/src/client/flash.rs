@@ -1,0 +1,271 @@
+//! Sends a blob to a device, and goes on after a link that broke.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use ray_runtime::{OpenError, RayBlob};
+
+use super::{ClientError, DeviceClient, unexpected};
+use crate::frame::checksum;
+use crate::protocol::{
+    CHUNK_UNIT, Chunk, IDENTITY_LENGTH, MAX_CHUNK, NewBlob, Refusal, Reply, Request, StoredBlob,
+    name,
+};
+
+/// How patiently a blob is sent.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FlashOptions {
+    /// Failures in a row, with no byte stored in between, after which it gives up.
+    pub retries: u32,
+    /// How long one answer may take. A device erases a block or checks a whole blob meanwhile.
+    pub timeout: Duration,
+    /// Serial number of the rig that the blob was calibrated on, if known.
+    pub rig_serial: Option<String>,
+}
+
+impl Default for FlashOptions {
+    fn default() -> Self {
+        Self {
+            retries: 5,
+            timeout: Duration::from_secs(20),
+            rig_serial: None,
+        }
+    }
+}
+
+/// How far it has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FlashProgress {
+    /// Bytes stored on the device.
+    pub stored: u32,
+    /// Bytes of the blob.
+    pub length: u32,
+    /// How often it was resumed.
+    pub resumed: u32,
+}
+
+/// A blob that is active on a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Flashed {
+    /// As the device stored it.
+    pub stored: StoredBlob,
+    /// It was active before, so nothing was sent.
+    pub was_active: bool,
+    /// How often the transfer was resumed.
+    pub resumed: u32,
+}
+
+/// Pause before the first new try; it doubles with each failure in a row.
+const FIRST_PAUSE: Duration = Duration::from_millis(50);
+const LONGEST_PAUSE: Duration = Duration::from_secs(2);
+
+impl DeviceClient {
+    /// Sends `blob`, has the device check it and makes it active. When the link breaks or stays
+    /// silent it connects again and goes on where the device stopped.
+    ///
+    /// Whatever goes wrong, the device keeps the blob it had, or has the new one whole.
+    ///
+    /// # Errors
+    /// [`ClientError::NotABlob`] before anything is sent; [`ClientError::Refused`] with the device's
+    /// reason; [`ClientError::GaveUp`].
+    pub fn flash(
+        &mut self,
+        blob: &[u8],
+        options: &FlashOptions,
+        on_progress: &mut dyn FnMut(FlashProgress),
+    ) -> Result<Flashed, ClientError> {
+        let new = NewBlob {
+            length: u32::try_from(blob.len()).unwrap_or(u32::MAX),
+            checksum: checksum(blob),
+            identity: identity_of(blob).map_err(ClientError::NotABlob)?,
+            rig_serial: options.rig_serial.as_deref().map(name),
+        };
+        let usual_timeout = std::mem::replace(&mut self.timeout, options.timeout);
+        let outcome = self.flash_patiently(&new, blob, options.retries, on_progress);
+        self.timeout = usual_timeout;
+        outcome
+    }
+
+    fn flash_patiently(
+        &mut self,
+        new: &NewBlob,
+        blob: &[u8],
+        retries: u32,
+        on_progress: &mut dyn FnMut(FlashProgress),
+    ) -> Result<Flashed, ClientError> {
+        let mut progress = FlashProgress {
+            stored: 0,
+            length: new.length,
+            resumed: 0,
+        };
+        let mut failures = 0;
+        let mut is_connected = true;
+        loop {
+            let best = progress.stored;
+            let outcome = match is_connected {
+                true => Ok(()),
+                false => self.reconnect(),
+            }
+            .and_then(|()| {
+                is_connected = true;
+                self.transfer(new, blob, &mut progress, on_progress)
+            });
+            let error = match outcome {
+                Ok(flashed) => return Ok(flashed),
+                Err(error) if error.is_passing() => error,
+                Err(error) => return Err(error),
+            };
+            failures = if progress.stored > best {
+                1
+            } else {
+                failures + 1
+            };
+            if failures > retries {
+                return Err(ClientError::GaveUp {
+                    tries: progress.resumed + 1,
+                    source: Box::new(error),
+                });
+            }
+            progress.resumed += 1;
+            is_connected = false;
+            std::thread::sleep(match error {
+                ClientError::Refused(Refusal::Busy { wait_ms }) => {
+                    Duration::from_millis(u64::from(wait_ms))
+                }
+                _ => (FIRST_PAUSE * (1 << (failures - 1).min(10))).min(LONGEST_PAUSE),
+            });
+        }
+    }
+
+    /// One try over the present link.
+    fn transfer(
+        &mut self,
+        new: &NewBlob,
+        blob: &[u8],
+        progress: &mut FlashProgress,
+        on_progress: &mut dyn FnMut(FlashProgress),
+    ) -> Result<Flashed, ClientError> {
+        let mut stored = match self.begin_update(new)? {
+            Begun::Active(stored) => {
+                return Ok(Flashed {
+                    stored,
+                    was_active: progress.resumed == 0,
+                    resumed: progress.resumed,
+                });
+            }
+            Begun::Receiving { received } => received,
+        };
+        let mut note = |stored| {
+            progress.stored = stored;
+            on_progress(*progress);
+        };
+        note(stored);
+        let rest = blob.get(stored as usize..).unwrap_or_default();
+        let mut chunks = rest.chunks(self.chunk_length());
+        let mut next = stored;
+        let mut under_way = VecDeque::new();
+        let window = self.window();
+        loop {
+            while under_way.len() < window
+                && let Some(chunk) = chunks.next()
+            {
+                under_way.push_back(self.send_chunk(next, chunk)?);
+                next += chunk.len() as u32;
+            }
+            let Some(sequence) = under_way.pop_front() else {
+                break;
+            };
+            stored = received(&self.receive(sequence)?)?;
+            note(stored);
+        }
+        let resumed = progress.resumed;
+        Ok(Flashed {
+            stored: self.finish_update()?,
+            was_active: false,
+            resumed,
+        })
+    }
+
+    /// Announces a blob. [`DeviceClient::flash`] does this and all that follows.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn begin_update(&mut self, new: &NewBlob) -> Result<Begun, ClientError> {
+        match self.ask(&Request::BeginUpdate(new.clone()))? {
+            Reply::Receiving { received } => Ok(Begun::Receiving { received }),
+            Reply::Active(stored) => Ok(Begun::Active(stored)),
+            reply => Err(unexpected("the start of an update", &reply)),
+        }
+    }
+
+    /// Sends bytes of the announced blob; how many the device has stored then.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn chunk(&mut self, offset: u32, bytes: &[u8]) -> Result<u32, ClientError> {
+        let sequence = self.send_chunk(offset, bytes)?;
+        received(&self.receive(sequence)?)
+    }
+
+    /// Has the device check what it was sent and make it active.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn finish_update(&mut self) -> Result<StoredBlob, ClientError> {
+        match self.ask(&Request::FinishUpdate)? {
+            Reply::Active(stored) => Ok(stored),
+            reply => Err(unexpected("the end of an update", &reply)),
+        }
+    }
+
+    /// Gives an update up.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn abort_update(&mut self) -> Result<(), ClientError> {
+        match self.ask(&Request::AbortUpdate)? {
+            Reply::Aborted => Ok(()),
+            reply => Err(unexpected("giving up an update", &reply)),
+        }
+    }
+
+    fn send_chunk(&mut self, offset: u32, bytes: &[u8]) -> Result<u16, ClientError> {
+        let Ok(bytes) = heapless::Vec::from_slice(bytes) else {
+            return Err(ClientError::Refused(Refusal::BadChunk { missing: 0 }));
+        };
+        self.send(&Request::Chunk(Chunk { offset, bytes }))
+    }
+
+    fn chunk_length(&self) -> usize {
+        let most = usize::from(self.greeting.max_chunk).min(MAX_CHUNK);
+        (most / CHUNK_UNIT * CHUNK_UNIT).max(CHUNK_UNIT)
+    }
+}
+
+/// What a device says to an announced blob.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Begun {
+    /// It is active already.
+    Active(StoredBlob),
+    /// It is under way.
+    Receiving {
+        /// So many bytes are stored already.
+        received: u32,
+    },
+}
+
+fn received(reply: &Reply) -> Result<u32, ClientError> {
+    match reply {
+        Reply::Receiving { received } => Ok(*received),
+        reply => Err(unexpected("a chunk", reply)),
+    }
+}
+
+/// The identity of a blob, which must be one, whole and readable.
+fn identity_of(blob: &[u8]) -> Result<[u8; IDENTITY_LENGTH], OpenError> {
+    let mut words = vec![0_u64; blob.len().div_ceil(8)];
+    let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
+    let (bytes, _) = bytes.split_at_mut(blob.len());
+    bytes.copy_from_slice(blob);
+    RayBlob::open(bytes).map(|blob| *blob.identity())
+}
