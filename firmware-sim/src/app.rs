@@ -3,6 +3,7 @@
 use heapless::Vec;
 use ray_runtime::{MeasureError, OpenError, PixelPoint, RayBlob};
 
+use crate::health::Health;
 use crate::port::{BlobStore, Clock};
 use crate::protocol::{
     BlobStatus, CameraStatus, Hello, MAX_CHUNK, MAX_MATCHES, Match, Measured, Point, Refusal,
@@ -19,6 +20,7 @@ pub struct Device<'f, C> {
     kind: &'static str,
     blob: Result<RayBlob<'f>, OpenError>,
     clock: C,
+    health: Health,
     answered: u32,
     refused: u32,
 }
@@ -32,6 +34,7 @@ impl<'f, C: Clock> Device<'f, C> {
             kind,
             blob: open(store.active_blob()),
             clock,
+            health: Health::new(),
             answered: 0,
             refused: 0,
         }
@@ -64,13 +67,15 @@ impl<'f, C: Clock> Device<'f, C> {
             updates: 0,
             rollbacks: 0,
             rig: None,
+            gaps: self.health.report(),
         }
     }
 
-    fn measure(&self, matches: &[Match]) -> Reply {
+    fn measure(&mut self, matches: &[Match]) -> Reply {
+        let health = &mut self.health;
         match &self.blob {
             Ok(blob) => Reply::Measured(bounded(
-                matches.iter().map(|asked| measure_one(blob, asked)),
+                matches.iter().map(|asked| measure_one(blob, asked, health)),
             )),
             Err(error) => Reply::Refused(Refusal::NoBlob {
                 open_error: error.code(),
@@ -131,7 +136,7 @@ fn blob_status(blob: &RayBlob<'_>) -> BlobStatus {
     }
 }
 
-fn measure_one(blob: &RayBlob<'_>, asked: &Match) -> Measured {
+fn measure_one(blob: &RayBlob<'_>, asked: &Match, health: &mut Health) -> Measured {
     let pixel_of = |sighting: Sighting| {
         (
             usize::from(sighting.camera),
@@ -139,6 +144,9 @@ fn measure_one(blob: &RayBlob<'_>, asked: &Match) -> Measured {
         )
     };
     let outcome = blob.triangulate_with_covariance(pixel_of(asked.first), pixel_of(asked.second));
+    if let Ok(measured) = &outcome {
+        health.note(measured);
+    }
     Measured {
         id: asked.id,
         outcome: outcome.map(Point::from).map_err(MeasureError::code),

@@ -14,6 +14,8 @@ use heapless::{String, Vec};
 use ray_runtime::Measurement;
 use serde::{Deserialize, Serialize};
 
+use crate::health::GapReport;
+
 pub use refusal::{FlashOperation, Refusal, RigPart};
 
 /// The protocol spoken here. It stands in every frame, and a device refuses any other.
@@ -264,6 +266,8 @@ pub struct Status {
     pub rollbacks: u32,
     /// What the device knows of its own cameras; without it, any blob is taken.
     pub rig: Option<Rig>,
+    /// The gaps of what it has measured with this blob; `None` before the first point.
+    pub gaps: Option<GapReport>,
 }
 
 /// What a slot holds.

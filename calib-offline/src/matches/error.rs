@@ -139,6 +139,12 @@ pub enum RowProblem {
         /// Pixels given.
         have: usize,
     },
+    /// More cameras than a device takes at once.
+    #[error("{have} of the cameras saw this point, a device measures with 2")]
+    TooManyPixels {
+        /// Pixels given.
+        have: usize,
+    },
 }
 
 impl MatchesError {
@@ -168,6 +174,9 @@ impl MatchesError {
                 }
                 RowProblem::HalfPixel | RowProblem::TooFewPixels { .. } => {
                     "give u and v for at least two cameras, or take the line away"
+                }
+                RowProblem::TooManyPixels { .. } => {
+                    "leave u and v empty but for two cameras, or measure here, with the blob"
                 }
             },
         };

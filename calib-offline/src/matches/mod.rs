@@ -16,8 +16,8 @@ pub use error::MatchesError;
 pub use header::Columns;
 pub use known::{KnownMatches, read_known};
 pub use list::read_matches;
-pub use source::{Number, PointSource, Sighting, Status};
-pub use stream::{MeasureSummary, StreamError, measure_stream};
+pub use source::{BatchSource, Number, PointSource, Sighting, Status};
+pub use stream::{MeasureSummary, StreamError, measure_batches, measure_stream};
 
 /// The header of `POINTS.csv`.
 pub const POINTS_HEADER: &str = "id,x,y,z,gap,sigma_x,sigma_y,sigma_z,status";

@@ -2,7 +2,7 @@
 
 use super::error::{RowProblem, shortened};
 use super::header::Columns;
-use super::source::{Number, PointSource, Sighting, Status};
+use super::source::{Number, Point, Sighting, Status};
 
 /// Reads a row into `sightings` (cleared first) and returns its id as it stands there.
 pub(super) fn parse<'a, N: Number>(
@@ -79,16 +79,10 @@ fn coordinate<N: Number>(text: &str) -> Result<N, RowProblem> {
     }
 }
 
-/// Appends the row of a match to `out`; returns its gap, mm, or why there is no point.
-pub(super) fn write<S: PointSource>(
-    source: &S,
-    id: &str,
-    sightings: &[Sighting<S::Number>],
-    out: &mut Vec<u8>,
-) -> Result<f64, Status> {
+/// Appends the row of a match to `out`.
+pub(super) fn write<N: Number>(id: &str, result: &Result<Point<N>, Status>, out: &mut Vec<u8>) {
     out.extend_from_slice(id.as_bytes());
-    let result = source.point(sightings);
-    match &result {
+    match result {
         Ok(found) => {
             let mut buffer = zmij::Buffer::new();
             let [x, y, z] = found.point_mm;
@@ -113,7 +107,6 @@ pub(super) fn write<S: PointSource>(
             out.push(b'\n');
         }
     }
-    result.map(|found| found.gap_mm.into())
 }
 
 #[cfg(test)]

@@ -65,6 +65,26 @@ pub trait PointSource: Sync {
     fn point(&self, sightings: &[Sighting<Self::Number>]) -> Result<Point<Self::Number>, Status>;
 }
 
+/// Turns many matches of two cameras at once into points: for one that is far away.
+pub trait BatchSource {
+    /// What it computes with.
+    type Number: Number;
+    /// Why it gave no answer.
+    type Error;
+
+    /// The names of the rig's cameras, in order.
+    fn cameras(&self) -> Vec<String>;
+
+    /// One answer for each match, in their order.
+    ///
+    /// # Errors
+    /// If it could not be asked.
+    fn points(&mut self, matches: &[[Sighting<Self::Number>; 2]]) -> Result<Answers<Self::Number>, Self::Error>;
+}
+
+/// Points, or why there is none.
+pub type Answers<N> = Vec<Result<Point<N>, Status>>;
+
 /// A calibration, evaluated in f64.
 #[derive(Debug)]
 pub struct RigSource<'a> {
@@ -179,10 +199,14 @@ impl PointSource for BlobSource<'_> {
             let found = self.blob.triangulate_many(&sightings);
             found.map(|found| Measurement {
                 found,
+                // Of more than two rays none is above another.
+                is_second_above: false,
                 covariance: None,
             })
         };
-        let Measurement { found, covariance } = result.map_err(|error| match error {
+        let Measurement {
+            found, covariance, ..
+        } = result.map_err(|error| match error {
             ray_runtime::MeasureError::Behind => Status::Behind,
             ray_runtime::MeasureError::Parallel => Status::Parallel,
             _ => Status::Outside,

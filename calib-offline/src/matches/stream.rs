@@ -1,12 +1,14 @@
-//! A whole file of matches in blocks: read in order, computed in parallel, written in order.
+//! A whole file of matches in blocks: read in order, computed in parallel or asked for elsewhere,
+//! written in order.
 
 use super::POINTS_HEADER;
 use super::error::{MatchesError, RowProblem, shortened};
 use super::header::Columns;
 use super::row;
-use super::source::{PointSource, Status};
+use super::source::{BatchSource, Number, Point, PointSource, Sighting, Status};
 use rayon::prelude::*;
 use serde::Serialize;
+use std::convert::Infallible;
 use std::io::{self, Read, Write};
 use std::path::Path;
 
@@ -33,16 +35,18 @@ pub struct MeasureSummary {
     pub gap_rms_mm: Option<f64>,
 }
 
-/// Why a stream of matches was not measured to its end.
+/// Why a stream of matches was not measured to its end; `E` is why the source gave no answer.
 #[derive(Debug)]
-pub enum StreamError {
+pub enum StreamError<E = Infallible> {
     /// The matches.
     Matches(MatchesError),
     /// The points could not be written.
     Write(io::Error),
+    /// The source.
+    Source(E),
 }
 
-impl From<MatchesError> for StreamError {
+impl<E> From<MatchesError> for StreamError<E> {
     fn from(error: MatchesError) -> Self {
         Self::Matches(error)
     }
@@ -59,7 +63,44 @@ pub fn measure_stream<S: PointSource>(
     input: &mut impl Read,
     output: &mut impl Write,
 ) -> Result<MeasureSummary, StreamError> {
+    measure_blocks(
+        &source.cameras(),
+        file,
+        input,
+        output,
+        |columns, block| {
+            let pieces = pieces(block).into_par_iter();
+            Ok(pieces
+                .map(|piece| measure_piece(source, columns, piece))
+                .collect())
+        },
+    )
+}
+
+/// The same with a source that answers many matches of two cameras at once, block by block.
+///
+/// # Errors
+/// [`StreamError`]; what was written until then is to be thrown away.
+pub fn measure_batches<S: BatchSource>(
+    source: &mut S,
+    file: &Path,
+    input: &mut impl Read,
+    output: &mut impl Write,
+) -> Result<MeasureSummary, StreamError<S::Error>> {
     let cameras = source.cameras();
+    measure_blocks(&cameras, file, input, output, |columns, block| {
+        Ok(vec![ask_piece(source, columns, block)?])
+    })
+}
+
+/// Has every block of the input measured and writes what comes of it.
+fn measure_blocks<E>(
+    cameras: &[String],
+    file: &Path,
+    input: &mut impl Read,
+    output: &mut impl Write,
+    mut measure: impl FnMut(&Columns, &[u8]) -> Result<Vec<Piece>, E>,
+) -> Result<MeasureSummary, StreamError<E>> {
     let mut blocks = Blocks {
         input,
         file,
@@ -81,13 +122,9 @@ pub fn measure_stream<S: PointSource>(
             let (header, rest) = first_line(block);
             block = rest;
             line += 1;
-            columns.insert(parse_header(file, header, &cameras)?)
+            columns.insert(parse_header(file, header, cameras)?)
         };
-        let pieces: Vec<Piece> = pieces(block)
-            .into_par_iter()
-            .map(|piece| measure_piece(source, columns, piece))
-            .collect();
-        for piece in pieces {
+        for piece in measure(columns, block).map_err(StreamError::Source)? {
             if let Some(problem) = piece.problem {
                 return Err(StreamError::Matches(MatchesError::Row {
                     file: file.to_owned(),
@@ -103,7 +140,7 @@ pub fn measure_stream<S: PointSource>(
     if columns.is_none() {
         return Err(StreamError::Matches(MatchesError::Empty {
             file: file.to_owned(),
-            expected: Columns::header_for(&cameras),
+            expected: Columns::header_for(cameras),
         }));
     }
     Ok(total.summary())
@@ -241,6 +278,7 @@ impl Tally {
 }
 
 /// What came of one piece: all its rows, or the rows before the first that is wrong.
+#[derive(Default)]
 struct Piece {
     out: Vec<u8>,
     lines: usize,
@@ -248,13 +286,65 @@ struct Piece {
     problem: Option<RowProblem>,
 }
 
+impl Piece {
+    /// Writes and counts a match.
+    fn add<N: Number>(&mut self, id: &str, result: &Result<Point<N>, Status>) {
+        row::write(id, result, &mut self.out);
+        self.tally
+            .count(result.map(|found| found.gap_mm.into()));
+    }
+}
+
 fn measure_piece<S: PointSource>(source: &S, columns: &Columns, bytes: &[u8]) -> Piece {
     let mut piece = Piece {
         out: Vec::with_capacity(2 * bytes.len()),
-        lines: 0,
-        tally: Tally::default(),
-        problem: None,
+        ..Piece::default()
     };
+    let (lines, problem) = each_row(columns, bytes, |id, sightings| {
+        piece.add(id, &source.point(sightings));
+        Ok(())
+    });
+    (piece.lines, piece.problem) = (lines, problem);
+    piece
+}
+
+/// The same of a source that is asked for all rows at once, those before a wrong one included.
+fn ask_piece<S: BatchSource>(
+    source: &mut S,
+    columns: &Columns,
+    bytes: &[u8],
+) -> Result<Piece, S::Error> {
+    let (mut ids, mut matches) = (Vec::new(), Vec::new());
+    let (lines, problem) = each_row(columns, bytes, |id, sightings| {
+        let &[first, second] = sightings else {
+            return Err(RowProblem::TooManyPixels {
+                have: sightings.len(),
+            });
+        };
+        ids.push(id);
+        matches.push([first, second]);
+        Ok(())
+    });
+    let mut piece = Piece {
+        lines,
+        problem,
+        ..Piece::default()
+    };
+    // Of a file that is wrong nothing is kept: nobody need be asked.
+    if piece.problem.is_none() {
+        for (id, result) in ids.iter().zip(source.points(&matches)?) {
+            piece.add(id, &result);
+        }
+    }
+    Ok(piece)
+}
+
+/// Hands every row on, up to the first that is wrong; how many lines that were, and what is wrong.
+fn each_row<'a, N: Number>(
+    columns: &Columns,
+    bytes: &'a [u8],
+    mut take: impl FnMut(&'a str, &[Sighting<N>]) -> Result<(), RowProblem>,
+) -> (usize, Option<RowProblem>) {
     let (text, broken) = match str::from_utf8(bytes) {
         Ok(text) => (text, false),
         // The rows before the broken one are still checked: the first wrong line is what counts.
@@ -265,24 +355,17 @@ fn measure_piece<S: PointSource>(source: &S, columns: &Columns, bytes: &[u8]) ->
         }
     };
     let mut sightings = Vec::with_capacity(columns.camera_idx.len());
+    let mut lines = 0;
     for line in text.lines() {
         if !line.is_empty() {
-            match row::parse(line, columns, &mut sightings) {
-                Ok(id) => piece
-                    .tally
-                    .count(row::write(source, id, &sightings, &mut piece.out)),
-                Err(problem) => {
-                    piece.problem = Some(problem);
-                    return piece;
-                }
+            let id = row::parse(line, columns, &mut sightings);
+            if let Err(problem) = id.and_then(|id| take(id, &sightings)) {
+                return (lines, Some(problem));
             }
         }
-        piece.lines += 1;
+        lines += 1;
     }
-    if broken {
-        piece.problem = Some(RowProblem::NotText);
-    }
-    piece
+    (lines, broken.then_some(RowProblem::NotText))
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use super::{
     RigPart, SelfTestReport, Sighting, SlotState, Status, StoredBlob, UpdateStatus, name,
 };
 use crate::frame::{FrameWriter, MAX_MESSAGE};
+use crate::health::{GapReport, Predicted};
 
 /// Asserts that `message` is exactly `bytes`, in both directions.
 fn assert_bytes<T: Serialize + DeserializeOwned + PartialEq + std::fmt::Debug>(
@@ -98,6 +99,19 @@ fn bytes_of_an_update() {
         &[7, 3, 2, 1, 0, 0, 0x80, 0x3f, 0, 0, 0, 0x3f],
     );
 }
+const GAPS: GapReport = GapReport {
+    points: 3,
+    mean_signed_mm: -1.0,
+    mean_size_mm: 2.0,
+    within_95_mm: 4.0,
+    predicted: Some(Predicted {
+        points: 2,
+        mean_sigma_mm: 0.5,
+        shift: -1.0,
+        spread: 1.0,
+    }),
+};
+
 const STORED: StoredBlob = StoredBlob {
     slot: 1,
     sequence: 2,
@@ -192,10 +206,11 @@ fn bytes_of_answers() {
         updates: 5,
         rollbacks: 6,
         rig: None,
+        gaps: None,
     };
     assert_bytes(
         &Reply::Status(without.clone()),
-        &[2, 1, 2, 3, 1, 5, 0, 0, 1, 0, 4, 5, 6, 0],
+        &[2, 1, 2, 3, 1, 5, 0, 0, 1, 0, 4, 5, 6, 0, 0],
     );
     let camera = CameraStatus {
         name: name("l"),
@@ -227,6 +242,7 @@ fn bytes_of_answers() {
             serial: name("s"),
             cameras: vec(&[camera]),
         }),
+        gaps: Some(GAPS),
         ..without
     };
     #[rustfmt::skip]
@@ -241,6 +257,8 @@ fn bytes_of_answers() {
         1, 9, 8, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
         4, 5, 6,
         1, 1, b's', 1, 1, b'l', 0x80, 0x01, 100,
+        1, 3, 0, 0, 0x80, 0xbf, 0, 0, 0, 0x40, 0, 0, 0x80, 0x40,
+        1, 2, 0, 0, 0, 0x3f, 0, 0, 0x80, 0xbf, 0, 0, 0x80, 0x3f,
     ]);
 
     let point = Point {
@@ -332,6 +350,14 @@ fn the_longest_messages_fit_a_frame() {
         rig: Some(Rig {
             serial: longest.clone(),
             cameras: vec(&vec![camera; MAX_CAMERAS_LISTED]),
+        }),
+        gaps: Some(GapReport {
+            points: u32::MAX,
+            predicted: Some(Predicted {
+                points: u32::MAX,
+                ..GAPS.predicted.unwrap()
+            }),
+            ..GAPS
         }),
     };
     let hello = Hello {
