@@ -8,6 +8,7 @@ use crate::detect::DetectError;
 use crate::detect::overlay::OverlayError;
 use crate::detect::ring_target::TargetError;
 use crate::detect::suspicion::LabelSuspicion;
+use crate::device::DeviceError;
 use crate::experiments::ExperimentError;
 use crate::export::ExportError;
 use crate::init::InitError;
@@ -17,6 +18,7 @@ use crate::pack::PackError;
 use crate::pinhole::PinholeError;
 use crate::report::store::CalibrationError;
 use crate::simulate::SimulateError;
+use std::convert::Infallible;
 use std::path::PathBuf;
 
 /// Why a command did not do what it was asked for.
@@ -91,6 +93,9 @@ pub enum Error {
     /// A blob that was to be written in another form.
     #[error("the blob cannot be exported")]
     Export(#[from] ExportError),
+    /// A device that did not do what it was asked for.
+    #[error("the device cannot be used")]
+    Device(#[from] DeviceError),
     /// A result that JSON cannot say.
     #[error("the result cannot be written as JSON")]
     Json(#[from] serde_json::Error),
@@ -106,6 +111,13 @@ pub enum Error {
     /// A request that cannot be met.
     #[error("the command cannot be run so")]
     Usage(#[from] UsageError),
+}
+
+/// What cannot fail fails with no error.
+impl From<Infallible> for Error {
+    fn from(never: Infallible) -> Self {
+        match never {}
+    }
 }
 
 /// Why a file is not a blob that this version reads.
@@ -176,6 +188,15 @@ pub enum UsageError {
         /// The last pose.
         last: usize,
     },
+    /// A device's verb without its address.
+    #[error("which device is meant? --device is missing")]
+    NoDevice,
+    /// A file that is to be flashed and is no blob.
+    #[error("{}: is a calibration, and a device takes blobs", path.display())]
+    NotPacked {
+        /// The file.
+        path: PathBuf,
+    },
     /// The input would be replaced by the output.
     #[error("{}: is what the command reads", path.display())]
     OutputIsInput {
@@ -197,6 +218,10 @@ impl UsageError {
                 "calibrate two cameras together; a single one gives rays only"
             }
             Self::NoSuchPose { .. } => "poses count from 0; see calib-offline inspect DATASET",
+            Self::NoDevice => "give its address, such as --device tcp:127.0.0.1:7777",
+            Self::NotPacked { .. } => {
+                "pack it first: calib-offline pack calibration.json -o rig.rays"
+            }
             Self::OutputIsInput { .. } => "choose another place with -o",
         };
         Some(text.to_owned())
@@ -255,6 +280,7 @@ impl Error {
             | Self::Matches(_)
             | Self::Pack(_)
             | Self::Export(_)
+            | Self::Device(_)
             | Self::Demo(_)
             | Self::Experiment(_)
             | Self::Json(_)
@@ -308,6 +334,7 @@ impl Error {
             Self::Matches(error) => error.remedy(),
             Self::Pack(error) => Some(pack_remedy(error)),
             Self::Export(error) => Some(error.remedy()),
+            Self::Device(error) => error.remedy(),
             Self::Write(error) => error.remedy(),
             Self::Usage(error) => error.remedy(),
         }

@@ -9,6 +9,7 @@ pub mod compare;
 pub mod dataset;
 pub mod demo;
 pub mod detect;
+pub mod device;
 pub mod error;
 pub mod evaluate;
 pub mod experiments;

@@ -1,6 +1,9 @@
 //! What can be written on the command line. Each help text starts with an example.
 
-use super::{calibrate, compare, demo, detect, evaluate, export, inspect, measure, pack, simulate};
+use super::{
+    calibrate, compare, demo, detect, device, evaluate, export, flash, inspect, measure, pack,
+    simulate,
+};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::num::NonZeroUsize;
 
@@ -48,10 +51,14 @@ pub enum Verb {
     Demo(demo::DemoArgs),
     /// Find the board's corners in a dataset's images: corners.csv
     Detect(detect::DetectArgs),
+    /// Ask a device how it is, have it test itself, or go back to the blob before
+    Device(device::DeviceArgs),
     /// Run the publication's experiments with three methods: figures, tables, evaluation.json
     Evaluate(evaluate::EvaluateArgs),
     /// Write a blob as Intel HEX, UF2, raw bytes or a C array
     Export(export::ExportArgs),
+    /// Send a blob to a device
+    Flash(flash::FlashArgs),
     /// Say what a dataset, a calibration or a blob is
     Inspect(inspect::InspectArgs),
     /// Triangulate matches

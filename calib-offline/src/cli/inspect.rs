@@ -4,6 +4,7 @@ use super::Outcome;
 use super::output::Console;
 use super::pack::form_name;
 use super::rig_file::{RigFile, open};
+use crate::dataset::identity::hex;
 use crate::dataset::split::without_excluded;
 use crate::dataset::{Dataset, load_corners};
 use crate::error::{Error, UsageError};
@@ -273,10 +274,7 @@ fn dataset_words(object: &DatasetObject) -> String {
 fn blob_object(blob: &RayBlob<'_>) -> BlobObject {
     BlobObject {
         bytes: blob.len(),
-        identity: blob.identity().iter().fold(String::new(), |mut hex, byte| {
-            let _ = write!(hex, "{byte:02x}");
-            hex
-        }),
+        identity: hex(blob.identity()),
         frame: blob.frame().to_owned(),
         written_by: blob.written_by().to_owned(),
         max_error_px: blob.max_error_px(),

@@ -1,15 +1,20 @@
-//! `measure`: matches to points, with a blob (the device's own code in f32) or a calibration (f64).
+//! `measure`: matches to points, with a blob (the device's own code in f32), a calibration (f64), or on a
+//! device.
 
 use super::Outcome;
 use super::output::Console;
 use super::place::check_file;
 use super::rig_file::{RigFile, open};
 use crate::atomic_file::{PendingFile, WriteError};
+use crate::device::{DeviceSource, connect};
 use crate::error::{Error, UsageError};
 use crate::matches::source::{BlobSource, PointSource, RigSource};
-use crate::matches::{MatchesError, MeasureSummary, POINTS_HEADER, StreamError, measure_stream};
+use crate::matches::{
+    MatchesError, MeasureSummary, POINTS_HEADER, StreamError, measure_batches, measure_stream,
+};
 use crate::report::text::short;
 use clap::Args;
+use firmware_sim::client::DEFAULT_TIMEOUT;
 use serde::Serialize;
 use std::fs::File;
 use std::io::Read;
@@ -18,7 +23,8 @@ use std::path::{Path, PathBuf};
 const EXAMPLE: &str = "\
 Example:
   calib-offline measure results/rig.rays matches.csv -o points.csv
-  calib-offline measure results/calibration.json matches.csv -o points.csv --frame left";
+  calib-offline measure results/calibration.json matches.csv -o points.csv --frame left
+  calib-offline measure --device tcp:127.0.0.1:7777 matches.csv -o points.csv";
 
 const FORMATS: &str = "\
 MATCHES.csv has the header id,u_left,v_left,u_right,v_right, with the names of the rig's cameras.
@@ -30,18 +36,24 @@ matches of two cameras whose uncertainty the rig carries: what the calibration l
 motion of the whole rig taken out) and pixel noise of the size of its corners'. Else it is empty.
 
 A blob is evaluated with the device's own library and gives the device's bits; a calibration is
-evaluated in double precision. An earlier POINTS.csv is replaced; any other file only with --force.
+evaluated in double precision. With --device the device measures, with the blob it has in use: the
+same bits as that blob gives here; matches of two cameras, in the rig's frame.
+An earlier POINTS.csv is replaced; any other file only with --force.
 
-With --json: schema calib-offline/measure/1, rig, rig_kind (blob or calibration), frame, output,
-matches, ok, outside, parallel, behind, gap_rms_mm.";
+With --json: schema calib-offline/measure/1, rig (the device's address with --device), rig_kind (blob,
+calibration or device), frame, output, matches, ok, outside, parallel, behind, gap_rms_mm.";
 
 /// The arguments.
 #[derive(Debug, Args)]
-#[command(before_help = EXAMPLE, after_help = FORMATS)]
+#[command(before_help = EXAMPLE, after_help = FORMATS, allow_missing_positional = true)]
 pub struct MeasureArgs {
     /// A blob (*.rays) or a calibration.json
-    #[arg(value_name = "RIG")]
-    pub rig: PathBuf,
+    #[arg(
+        value_name = "RIG",
+        required_unless_present = "device",
+        conflicts_with = "device"
+    )]
+    pub rig: Option<PathBuf>,
     /// The pixels that belong together; - is standard input
     #[arg(value_name = "MATCHES.csv")]
     pub matches: PathBuf,
@@ -49,8 +61,11 @@ pub struct MeasureArgs {
     #[arg(short, long, value_name = "POINTS.csv")]
     pub output: PathBuf,
     /// Give the points in the frame of this camera instead of the rig's
-    #[arg(long, value_name = "CAMERA")]
+    #[arg(long, value_name = "CAMERA", conflicts_with = "device")]
     pub frame: Option<String>,
+    /// Let this device measure, instead of a RIG: tcp:HOST:PORT or serial:PORT[@BAUD]
+    #[arg(long, value_name = "ADDRESS")]
+    pub device: Option<String>,
     /// Replace whatever stands in the output's place
     #[arg(long)]
     pub force: bool,
@@ -73,36 +88,54 @@ struct MeasureObject<'a> {
 /// # Errors
 /// [`Error`], with nothing written.
 pub fn run(args: &MeasureArgs, console: &Console) -> Result<Outcome, Error> {
-    check_file(
-        &args.output,
-        POINTS_HEADER.as_bytes(),
-        &[&args.rig, &args.matches],
-        args.force,
-    )?;
-    let frame = args.frame.as_deref();
-    let (kind, summary) = match RigFile::read(&args.rig)? {
-        RigFile::Blob(bytes) => {
-            let blob = open(&bytes, &args.rig)?;
-            let names = names(BlobSource::new(&blob, None));
-            let source = BlobSource::new(&blob, frame);
-            ("blob", measure(args, source.as_ref(), names)?)
+    let mut inputs = vec![args.matches.as_path()];
+    inputs.extend(args.rig.as_deref());
+    check_file(&args.output, POINTS_HEADER.as_bytes(), &inputs, args.force)?;
+    let (rig, kind, summary) = match (&args.device, &args.rig) {
+        (Some(address), _) => (Path::new(address), "device", measure_there(args, address)?),
+        (None, Some(rig)) => {
+            let (kind, summary) = measure_here(args, rig)?;
+            (rig.as_path(), kind, summary)
         }
-        RigFile::Calibration(calibration) => {
-            let names = names(RigSource::new(&calibration.rig, None));
-            let source = RigSource::new(&calibration.rig, frame);
-            ("calibration", measure(args, source.as_ref(), names)?)
-        }
+        (None, None) => return Err(Error::Usage(UsageError::NoDevice)),
     };
     let object = MeasureObject {
         schema: "calib-offline/measure/1",
-        rig: &args.rig,
+        rig,
         rig_kind: kind,
-        frame: frame.unwrap_or("rig"),
+        frame: args.frame.as_deref().unwrap_or("rig"),
         output: &args.output,
         summary,
     };
     console.result(&in_words(&object), &object);
     Ok(Outcome::Done)
+}
+
+/// Has a device measure.
+fn measure_there(args: &MeasureArgs, address: &str) -> Result<MeasureSummary, Error> {
+    let client = connect(address, DEFAULT_TIMEOUT)?;
+    let mut source = DeviceSource::new(client, address)?;
+    stream(args, |file, input, output| {
+        measure_batches(&mut source, file, input, output)
+    })
+}
+
+/// Measures with a file; what kind it is, too.
+fn measure_here(args: &MeasureArgs, rig: &Path) -> Result<(&'static str, MeasureSummary), Error> {
+    let frame = args.frame.as_deref();
+    Ok(match RigFile::read(rig)? {
+        RigFile::Blob(bytes) => {
+            let blob = open(&bytes, rig)?;
+            let names = names(BlobSource::new(&blob, None));
+            let source = BlobSource::new(&blob, frame);
+            ("blob", measure(args, rig, source.as_ref(), names)?)
+        }
+        RigFile::Calibration(calibration) => {
+            let names = names(RigSource::new(&calibration.rig, None));
+            let source = RigSource::new(&calibration.rig, frame);
+            ("calibration", measure(args, rig, source.as_ref(), names)?)
+        }
+    })
 }
 
 fn names(source: Option<impl PointSource>) -> Vec<String> {
@@ -112,12 +145,13 @@ fn names(source: Option<impl PointSource>) -> Vec<String> {
 /// `source` is none where the frame is none of the cameras `known`.
 fn measure<S: PointSource>(
     args: &MeasureArgs,
+    rig: &Path,
     source: Option<&S>,
     known: Vec<String>,
 ) -> Result<MeasureSummary, Error> {
     if known.len() < 2 {
         return Err(Error::Usage(UsageError::OneCamera {
-            path: args.rig.clone(),
+            path: rig.to_owned(),
         }));
     }
     let Some(source) = source else {
@@ -126,6 +160,23 @@ fn measure<S: PointSource>(
             known,
         }));
     };
+    stream(args, |file, input, output| {
+        measure_stream(source, file, input, output)
+    })
+}
+
+/// Opens the matches, has them measured, and keeps the points if all went well.
+fn stream<E>(
+    args: &MeasureArgs,
+    measure: impl FnOnce(
+        &Path,
+        &mut Box<dyn Read>,
+        &mut PendingFile,
+    ) -> Result<MeasureSummary, StreamError<E>>,
+) -> Result<MeasureSummary, Error>
+where
+    Error: From<E>,
+{
     let mut input: Box<dyn Read> = if args.matches.as_os_str() == "-" {
         Box::new(std::io::stdin().lock())
     } else {
@@ -136,15 +187,14 @@ fn measure<S: PointSource>(
         Box::new(file)
     };
     let mut output = PendingFile::create(&args.output)?;
-    let summary = measure_stream(source, &args.matches, &mut input, &mut output).map_err(
-        |error| match error {
-            StreamError::Matches(error) => Error::Matches(error),
-            StreamError::Write(source) => Error::Write(WriteError::Io {
-                path: args.output.clone(),
-                source,
-            }),
-        },
-    )?;
+    let summary = measure(&args.matches, &mut input, &mut output).map_err(|error| match error {
+        StreamError::Matches(error) => Error::Matches(error),
+        StreamError::Write(source) => Error::Write(WriteError::Io {
+            path: args.output.clone(),
+            source,
+        }),
+        StreamError::Source(error) => Error::from(error),
+    })?;
     output.commit()?;
     Ok(summary)
 }

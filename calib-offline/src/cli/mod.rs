@@ -9,9 +9,11 @@ pub mod compare;
 pub mod demo;
 pub mod detect;
 pub mod detect_target;
+pub mod device;
 pub mod evaluate;
 pub mod export;
 mod failure;
+pub mod flash;
 pub mod inspect;
 pub mod measure;
 pub mod output;
@@ -65,8 +67,10 @@ fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
         Verb::Compare(args) => compare::run(args, console),
         Verb::Demo(args) => demo::run(args, console),
         Verb::Detect(args) => recording::detect(args, console),
+        Verb::Device(args) => device::run(args, console),
         Verb::Evaluate(args) => evaluate::run(args, console),
         Verb::Export(args) => export::run(args, console),
+        Verb::Flash(args) => flash::run(args, console),
         Verb::Inspect(args) => inspect::run(args, console),
         Verb::Measure(args) => measure::run(args, console),
         Verb::Pack(args) => pack::run(args, console),

@@ -43,9 +43,14 @@ pub fn input_sha256(dataset: &Dataset, views: &[View]) -> String {
         }
         hash.update(&facts);
     }
-    hash.finalize()
+    hex(&hash.finalize())
+}
+
+/// Bytes as hexadecimal digits: how identities are shown.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes
         .iter()
-        .fold(String::with_capacity(64), |mut hex, byte| {
+        .fold(String::with_capacity(2 * bytes.len()), |mut hex, byte| {
             let _ = write!(hex, "{byte:02x}");
             hex
         })

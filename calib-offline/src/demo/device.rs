@@ -2,7 +2,7 @@
 
 use super::DemoError;
 use super::known::Pair;
-use crate::matches::Sighting;
+use crate::device::on_wire;
 use crate::report::Calibration;
 use firmware_sim::client::{ClientError, DeviceClient};
 use firmware_sim::host::SimulatedDevice;
@@ -88,15 +88,6 @@ pub fn check(
         points: answers.iter().filter(|a| a.outcome.is_ok()).count(),
         different,
     })
-}
-
-/// A device has 256 cameras at most, and so does a blob.
-fn on_wire((camera_idx, [u_px, v_px]): Sighting<f32>) -> firmware_sim::protocol::Sighting {
-    firmware_sim::protocol::Sighting {
-        camera: u8::try_from(camera_idx).unwrap_or(u8::MAX),
-        u_px,
-        v_px,
-    }
 }
 
 fn on_host(blob: &RayBlob<'_>, pair: &Pair) -> Result<Point, u8> {

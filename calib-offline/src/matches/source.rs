@@ -79,7 +79,10 @@ pub trait BatchSource {
     ///
     /// # Errors
     /// If it could not be asked.
-    fn points(&mut self, matches: &[[Sighting<Self::Number>; 2]]) -> Result<Answers<Self::Number>, Self::Error>;
+    fn points(
+        &mut self,
+        matches: &[[Sighting<Self::Number>; 2]],
+    ) -> Result<Answers<Self::Number>, Self::Error>;
 }
 
 /// Points, or why there is none.

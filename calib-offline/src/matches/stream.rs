@@ -63,18 +63,12 @@ pub fn measure_stream<S: PointSource>(
     input: &mut impl Read,
     output: &mut impl Write,
 ) -> Result<MeasureSummary, StreamError> {
-    measure_blocks(
-        &source.cameras(),
-        file,
-        input,
-        output,
-        |columns, block| {
-            let pieces = pieces(block).into_par_iter();
-            Ok(pieces
-                .map(|piece| measure_piece(source, columns, piece))
-                .collect())
-        },
-    )
+    measure_blocks(&source.cameras(), file, input, output, |columns, block| {
+        let pieces = pieces(block).into_par_iter();
+        Ok(pieces
+            .map(|piece| measure_piece(source, columns, piece))
+            .collect())
+    })
 }
 
 /// The same with a source that answers many matches of two cameras at once, block by block.
@@ -290,8 +284,7 @@ impl Piece {
     /// Writes and counts a match.
     fn add<N: Number>(&mut self, id: &str, result: &Result<Point<N>, Status>) {
         row::write(id, result, &mut self.out);
-        self.tally
-            .count(result.map(|found| found.gap_mm.into()));
+        self.tally.count(result.map(|found| found.gap_mm.into()));
     }
 }
 

@@ -1,0 +1,176 @@
+//! `device`: how a device is, whether it computes what the packing host did, and back to the blob before.
+
+use super::Outcome;
+use super::output::Console;
+use crate::dataset::identity::hex;
+use crate::device::{DeviceError, DeviceState, connect, state_in_words};
+use crate::error::{Error, UsageError};
+use clap::{Args, Subcommand};
+use firmware_sim::client::DeviceClient;
+use serde::Serialize;
+use std::time::Duration;
+
+const EXAMPLE: &str = "\
+Example:
+  calib-offline device --device tcp:127.0.0.1:7777 status
+  calib-offline device --device serial:/dev/ttyACM0 selftest
+  calib-offline device --device tcp:127.0.0.1:7777 rollback";
+
+const FORMATS: &str = "\
+status    what it measures with, what its two slots hold, and whether the calibration still fits: the
+          gaps between the rays of what it has measured, with sign and unit, beside those that the
+          blob predicts. Gaps do not see an error of scale or of the cameras' distance.
+selftest  the blob's self-tests, computed on the device; they must give the packing host's bits
+rollback  the blob in the other slot, after a check of all of it, becomes the one in use
+
+Exit code 1: the gaps say that the cameras have moved, or a self-test gave other bits.
+
+With --json: schema calib-offline/device-status/1 with device, firmware, uptime_ms, answered, refused,
+updates, rollbacks, max_blob_bytes, blob (identity, bytes, camera_count, cameras: name, width_px,
+height_px; or null), open_error, slots (state: empty, receiving, holds with is_active, sequence, bytes,
+checksum and identity, or unusable with sequence and open_error), update (identity, bytes,
+received_bytes), rig (serial, cameras), gaps (verdict: fits, shifted, scattered, too_few_points or
+nothing_predicted; points, mean_signed_mm, mean_size_mm, within_95_mm, predicted: points, mean_sigma_mm,
+shift, spread); schema calib-offline/device-selftest/1 with tests, equal, unanswered, worst_mm,
+worst_direction; schema calib-offline/device-rollback/1 with slot, sequence, bytes, identity.";
+
+/// The arguments.
+#[derive(Debug, Args)]
+#[command(before_help = EXAMPLE, after_help = FORMATS)]
+pub struct DeviceArgs {
+    /// The device: tcp:HOST:PORT or serial:PORT[@BAUD]
+    #[arg(long, value_name = "ADDRESS", global = true)]
+    pub device: Option<String>,
+    /// How long an answer may take, s
+    #[arg(long, value_name = "SECONDS", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=600), global = true)]
+    pub timeout: u16,
+    /// What to ask
+    #[command(subcommand)]
+    pub question: Question,
+}
+
+/// What to ask.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Subcommand)]
+pub enum Question {
+    /// How it is, and whether its calibration still fits
+    Status,
+    /// Whether it computes the bits of the host that packed its blob
+    Selftest,
+    /// Go back to the blob in the other slot
+    Rollback,
+}
+
+/// What `--json` prints of the status.
+#[derive(Debug, Serialize)]
+struct StatusObject {
+    schema: &'static str,
+    #[serde(flatten)]
+    state: DeviceState,
+}
+
+/// What `--json` prints of the self-test.
+#[derive(Debug, Serialize)]
+struct SelfTestObject {
+    schema: &'static str,
+    tests: u16,
+    equal: u16,
+    unanswered: u16,
+    worst_mm: f32,
+    worst_direction: f32,
+}
+
+/// What `--json` prints of a rollback.
+#[derive(Debug, Serialize)]
+struct RollbackObject {
+    schema: &'static str,
+    slot: u8,
+    sequence: u32,
+    bytes: u32,
+    identity: String,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Error`].
+pub fn run(args: &DeviceArgs, console: &Console) -> Result<Outcome, Error> {
+    let address = args
+        .device
+        .as_deref()
+        .ok_or(Error::Usage(UsageError::NoDevice))?;
+    let mut client = connect(address, Duration::from_secs(args.timeout.into()))?;
+    match args.question {
+        Question::Status => status(&mut client, console),
+        Question::Selftest => selftest(&mut client, console),
+        Question::Rollback => rollback(&mut client, console),
+    }
+}
+
+fn status(client: &mut DeviceClient, console: &Console) -> Result<Outcome, Error> {
+    let status = client.status().map_err(DeviceError::Client)?;
+    let state = DeviceState::new(client.greeting(), &status);
+    let words = state_in_words(&state);
+    let is_shifted = state.is_shifted();
+    let object = StatusObject {
+        schema: "calib-offline/device-status/1",
+        state,
+    };
+    console.result(&words, &object);
+    Ok(outcome(!is_shifted))
+}
+
+fn selftest(client: &mut DeviceClient, console: &Console) -> Result<Outcome, Error> {
+    let report = client.self_test().map_err(DeviceError::Client)?;
+    let object = SelfTestObject {
+        schema: "calib-offline/device-selftest/1",
+        tests: report.tests,
+        equal: report.equal,
+        unanswered: report.unanswered,
+        worst_mm: report.worst_mm,
+        worst_direction: report.worst_direction,
+    };
+    let is_equal = report.equal == report.tests;
+    let words = if is_equal {
+        format!(
+            "all {} self-tests gave the bits of the host that packed the blob",
+            report.tests
+        )
+    } else {
+        format!(
+            "{} of {} self-tests gave other bits than the host that packed the blob ({} no answer); worst difference {:e} mm, \
+             {:e} of a direction: do not measure with this firmware",
+            report.tests - report.equal.min(report.tests),
+            report.tests,
+            report.unanswered,
+            report.worst_mm,
+            report.worst_direction
+        )
+    };
+    console.result(&words, &object);
+    Ok(outcome(is_equal))
+}
+
+fn rollback(client: &mut DeviceClient, console: &Console) -> Result<Outcome, Error> {
+    let stored = client.rollback().map_err(DeviceError::Client)?;
+    let object = RollbackObject {
+        schema: "calib-offline/device-rollback/1",
+        slot: stored.slot,
+        sequence: stored.sequence,
+        bytes: stored.length,
+        identity: hex(&stored.identity),
+    };
+    let words = format!(
+        "blob {} ({} bytes) in slot {} is in use again, as number {}",
+        object.identity, object.bytes, object.slot, object.sequence
+    );
+    console.result(&words, &object);
+    Ok(Outcome::Done)
+}
+
+const fn outcome(is_good: bool) -> Outcome {
+    if is_good {
+        Outcome::Done
+    } else {
+        Outcome::VerdictFail
+    }
+}

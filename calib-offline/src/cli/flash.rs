@@ -1,0 +1,154 @@
+//! `flash`: a blob into the inactive slot of a device, checked there, and only then in use.
+
+use super::Outcome;
+use super::output::Console;
+use super::rig_file::{RigFile, open};
+use crate::dataset::identity::hex;
+use crate::device::{DeviceError, connect};
+use crate::error::{Error, UsageError};
+use crate::progress::Progress;
+use clap::Args;
+use firmware_sim::client::{FlashOptions, FlashProgress};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+const EXAMPLE: &str = "\
+Example:
+  calib-offline flash results/rig.rays --device tcp:127.0.0.1:7777
+  calib-offline flash results/rig.rays --device serial:/dev/ttyACM0@115200 --rig-serial R-0042";
+
+const FORMATS: &str = "\
+The device stores the blob in the slot that it does not use, reads it back, opens it and compares its
+cameras with its own; only then it is in use, at once and after every restart. Whatever fails or is cut
+off, the blob before stays in use; `calib-offline device rollback` brings it back later, too. A link that
+breaks is opened again, and the transfer goes on where it stopped.
+
+A device that knows its cameras refuses the blob of another rig; one that knows its serial number
+takes only blobs that are flashed with it (--rig-serial).
+
+With --json: schema calib-offline/flash/1, rig, device, slot, sequence, bytes, identity,
+was_active (true: the device had it in use already and nothing was sent), resumed (how often a broken
+transfer went on).";
+
+/// The arguments.
+#[derive(Debug, Args)]
+#[command(before_help = EXAMPLE, after_help = FORMATS)]
+pub struct FlashArgs {
+    /// The blob
+    #[arg(value_name = "RIG.rays")]
+    pub rig: PathBuf,
+    /// The device: tcp:HOST:PORT or serial:PORT[@BAUD]
+    #[arg(long, value_name = "ADDRESS")]
+    pub device: String,
+    /// The serial number of the rig that was calibrated
+    #[arg(long, value_name = "SERIAL")]
+    pub rig_serial: Option<String>,
+    /// How long an answer may take, s: the device erases and checks meanwhile
+    #[arg(long, value_name = "SECONDS", default_value_t = 20, value_parser = clap::value_parser!(u16).range(1..=600))]
+    pub timeout: u16,
+    /// Failures in a row after which to give up
+    #[arg(long, value_name = "COUNT", default_value_t = 5)]
+    pub retries: u32,
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct FlashObject<'a> {
+    schema: &'static str,
+    rig: &'a Path,
+    device: &'a str,
+    slot: u8,
+    sequence: u32,
+    bytes: u32,
+    identity: String,
+    was_active: bool,
+    resumed: u32,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Error`]; the device then has the blob in use that it had before.
+pub fn run(args: &FlashArgs, console: &Console) -> Result<Outcome, Error> {
+    let RigFile::Blob(bytes) = RigFile::read(&args.rig)? else {
+        return Err(Error::Usage(UsageError::NotPacked {
+            path: args.rig.clone(),
+        }));
+    };
+    // Before the device is bothered: the file's own fault is told with its name.
+    open(&bytes, &args.rig)?;
+    let timeout = Duration::from_secs(args.timeout.into());
+    let options = FlashOptions {
+        retries: args.retries,
+        timeout,
+        rig_serial: args.rig_serial.clone(),
+    };
+    let mut client = connect(&args.device, timeout)?;
+    let mut shown = Shown::new(console.progress());
+    let flashed = client.flash(&bytes, &options, &mut |progress| shown.show(progress));
+    console.progress().end();
+    let flashed = flashed.map_err(DeviceError::Client)?;
+    let object = FlashObject {
+        schema: "calib-offline/flash/1",
+        rig: &args.rig,
+        device: &args.device,
+        slot: flashed.stored.slot,
+        sequence: flashed.stored.sequence,
+        bytes: flashed.stored.length,
+        identity: hex(&flashed.stored.identity),
+        was_active: flashed.was_active,
+        resumed: flashed.resumed,
+    };
+    console.result(&in_words(&object), &object);
+    Ok(Outcome::Done)
+}
+
+/// Shows what the device has stored, in kilobytes.
+struct Shown<'a> {
+    progress: &'a dyn Progress,
+    steps: Option<u32>,
+}
+
+impl<'a> Shown<'a> {
+    const STEP: u32 = 1 << 10;
+
+    const fn new(progress: &'a dyn Progress) -> Self {
+        Self {
+            progress,
+            steps: None,
+        }
+    }
+
+    fn show(&mut self, now: FlashProgress) {
+        let mut steps = self.steps.unwrap_or_else(|| {
+            let total = now.length.div_ceil(Self::STEP);
+            self.progress.begin("send, KiB", total as usize);
+            0
+        });
+        while steps < now.stored.div_ceil(Self::STEP) {
+            self.progress.advance();
+            steps += 1;
+        }
+        self.steps = Some(steps);
+    }
+}
+
+fn in_words(object: &FlashObject<'_>) -> String {
+    let what = format!("blob {} ({} bytes)", object.identity, object.bytes);
+    if object.was_active {
+        return format!(
+            "{what} is in use on the device already, in slot {}: nothing was sent",
+            object.slot
+        );
+    }
+    let resumed = match object.resumed {
+        0 => String::new(),
+        1 => "; the link broke once on the way".to_owned(),
+        count => format!("; the link broke {count} times on the way"),
+    };
+    format!(
+        "{what} is in use on the device, in slot {} as number {}{resumed}",
+        object.slot, object.sequence
+    )
+}

@@ -1,0 +1,96 @@
+//! A device as a source of points.
+
+use super::DeviceError;
+use crate::matches::source::{Answers, BatchSource, Point, Sighting, Status};
+use firmware_sim::client::DeviceClient;
+use firmware_sim::protocol::{self, Match};
+use ray_runtime::{LookupError, MeasureError};
+
+/// A device that triangulates: the bits of the blob in its flash, measured there.
+#[derive(Debug)]
+pub struct DeviceSource {
+    client: DeviceClient,
+    cameras: Vec<String>,
+}
+
+impl DeviceSource {
+    /// A source of the device's active blob.
+    ///
+    /// # Errors
+    /// [`DeviceError`] if it has none, or one whose cameras it does not all name.
+    pub fn new(mut client: DeviceClient, address: &str) -> Result<Self, DeviceError> {
+        let blob = client
+            .status()?
+            .blob
+            .map_err(|open_error| DeviceError::NoBlob {
+                address: address.to_owned(),
+                open_error,
+            })?;
+        let (count, named) = (usize::from(blob.camera_count), blob.cameras.len());
+        if named < count {
+            return Err(DeviceError::TooManyCameras { count, named });
+        }
+        if count < 2 {
+            return Err(DeviceError::OneCamera);
+        }
+        let cameras = blob.cameras.iter();
+        Ok(Self {
+            client,
+            cameras: cameras.map(|camera| camera.name.to_string()).collect(),
+        })
+    }
+}
+
+impl BatchSource for DeviceSource {
+    type Number = f32;
+    type Error = DeviceError;
+
+    fn cameras(&self) -> Vec<String> {
+        self.cameras.clone()
+    }
+
+    fn points(&mut self, matches: &[[Sighting<f32>; 2]]) -> Result<Answers<f32>, DeviceError> {
+        let asked: Vec<Match> = (0..)
+            .zip(matches)
+            .map(|(id, [first, second])| Match {
+                id,
+                first: on_wire(*first),
+                second: on_wire(*second),
+            })
+            .collect();
+        let measured = self.client.measure(&asked)?;
+        let answers = measured.into_iter().map(|answer| match answer.outcome {
+            Ok(found) => Ok(Ok(Point {
+                point_mm: found.point_mm,
+                // Correctly rounded, as the runtime's own root: the same bits.
+                gap_mm: found.gap_squared_mm2.sqrt(),
+                sigma_mm: found.sigma_mm,
+            })),
+            Err(code) => match status(code) {
+                Some(status) => Ok(Err(status)),
+                None => Err(DeviceError::UnknownOutcome { code }),
+            },
+        });
+        answers.collect()
+    }
+}
+
+/// A blob has 64 cameras at most.
+pub fn on_wire((camera_idx, [u_px, v_px]): Sighting<f32>) -> protocol::Sighting {
+    protocol::Sighting {
+        camera: u8::try_from(camera_idx).unwrap_or(u8::MAX),
+        u_px,
+        v_px,
+    }
+}
+
+/// Why there is no point, by the runtime's code.
+fn status(code: u8) -> Option<Status> {
+    [
+        (LookupError::Outside.code(), Status::Outside),
+        (MeasureError::Parallel.code(), Status::Parallel),
+        (MeasureError::Behind.code(), Status::Behind),
+    ]
+    .into_iter()
+    .find_map(|(known, status)| (known == code).then_some(status))
+}

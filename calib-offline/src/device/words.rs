@@ -1,0 +1,116 @@
+//! A device's state for people.
+
+use super::state::{CameraState, DeviceState, SlotState};
+
+/// What the device is, what it holds, and whether its calibration still fits: a few lines.
+pub fn state_in_words(state: &DeviceState) -> String {
+    let mut lines = vec![format!(
+        "{}, firmware {}, up for {}; {} requests answered, {} refused; {} updates, {} rollbacks",
+        state.device,
+        state.firmware,
+        duration(state.uptime_ms),
+        state.answered,
+        state.refused,
+        state.updates,
+        state.rollbacks
+    )];
+    lines.push(match (&state.blob, state.open_error) {
+        (Some(blob), _) => format!(
+            "measures with blob {} ({} bytes): {}{}",
+            blob.identity,
+            blob.bytes,
+            cameras(&blob.cameras),
+            match usize::from(blob.camera_count).saturating_sub(blob.cameras.len()) {
+                0 => String::new(),
+                more => format!(" and {more} more"),
+            }
+        ),
+        (None, code) => format!(
+            "measures nothing: {}",
+            match code {
+                Some(2) | None => "its flash holds no blob; send one with calib-offline flash".to_owned(),
+                Some(code) => format!(
+                    "the blob in its flash cannot be opened (code {code}); send one with calib-offline flash"
+                ),
+            }
+        ),
+    });
+    for (number, slot) in state.slots.iter().enumerate() {
+        lines.push(format!("slot {number}: {}", slot_in_words(slot)));
+    }
+    if let Some(update) = &state.update {
+        lines.push(format!(
+            "an update is under way: {} of {} bytes of blob {}",
+            update.received_bytes, update.bytes, update.identity
+        ));
+    }
+    if let Some(rig) = &state.rig {
+        let serial = match rig.serial.as_str() {
+            "" => String::new(),
+            serial => format!(", rig {serial}"),
+        };
+        lines.push(format!(
+            "takes blobs for its own cameras only: {}{serial}",
+            cameras(&rig.cameras)
+        ));
+    }
+    lines.push(match &state.gaps {
+        Some(gaps) => gaps.report.to_string(),
+        None => "whether the calibration still fits is not known yet: nothing was measured since it started"
+            .to_owned(),
+    });
+    lines.join("\n")
+}
+
+fn slot_in_words(slot: &SlotState) -> String {
+    match slot {
+        SlotState::Empty => "empty".to_owned(),
+        SlotState::Receiving => "receives a blob".to_owned(),
+        SlotState::Holds {
+            is_active,
+            sequence,
+            bytes,
+            identity,
+            ..
+        } => format!(
+            "blob {identity} ({bytes} bytes), number {sequence}{}",
+            if *is_active {
+                ", in use"
+            } else {
+                "; calib-offline device rollback makes it the one in use"
+            }
+        ),
+        SlotState::Unusable {
+            sequence,
+            open_error,
+        } => format!("what was number {sequence} is damaged (code {open_error})"),
+    }
+}
+
+fn cameras(cameras: &[CameraState]) -> String {
+    let of_one = |camera: &CameraState| {
+        format!("{} {} x {}", camera.name, camera.width_px, camera.height_px)
+    };
+    cameras.iter().map(of_one).collect::<Vec<_>>().join(", ")
+}
+
+fn duration(ms: u64) -> String {
+    let seconds = ms / 1000;
+    match seconds {
+        0..=119 => format!("{seconds} s"),
+        120..=7199 => format!("{} min", seconds / 60),
+        7200..=172_799 => format!("{} h", seconds / 3600),
+        _ => format!("{} days", seconds / 86400),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_told_in_fitting_units() {
+        let told = [0, 119_999, 120_000, 7_200_000, 172_800_000].map(duration);
+        assert_eq!(told, ["0 s", "119 s", "2 min", "2 h", "2 days"]);
+    }
+}
