@@ -252,6 +252,3 @@ fn read_unit<R: ReadNorFlash>(slot: &mut R, address: u32) -> Result<[u8; UNIT], 
         })?;
     Ok(unit)
 }
-
-#[cfg(test)]
-mod tests;

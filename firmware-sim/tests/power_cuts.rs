@@ -164,6 +164,12 @@ fn survive(
     found
 }
 
+/// `SEEDS=10` in the environment draws ten times as often.
+fn seeds() -> u64 {
+    let seeds = std::env::var("SEEDS").ok();
+    seeds.and_then(|text| text.parse().ok()).unwrap_or(1)
+}
+
 const MANNERS: [Cut; 3] = [Cut::Clean, Cut::Torn, Cut::Weak];
 
 /// Places inside an operation: each byte of a unit; of a block, all that differ in what they hit.
@@ -198,7 +204,7 @@ fn a_cut_at_every_byte_of_an_update() {
         for operation in 0..operations(&before, &requests) {
             for byte in bytes_of(operation, &erases) {
                 for cut in MANNERS {
-                    for seed in 0..2 {
+                    for seed in 0..seeds() {
                         let cut = PowerCut {
                             operation,
                             byte,
@@ -225,7 +231,7 @@ fn a_cut_at_every_byte_of_a_rollback() {
     for operation in 0..operations(&before, &requests) {
         for byte in 0..=UNIT {
             for cut in MANNERS {
-                for seed in 0..50 {
+                for seed in 0..20 * seeds() {
                     let cut = PowerCut {
                         operation,
                         byte,
@@ -266,7 +272,7 @@ fn a_second_cut_while_the_device_recovers() {
                                     byte,
                                     cut,
                                 };
-                                for seed in 0..4 {
+                                for seed in 0..2 * seeds() {
                                     let cuts = [first, second];
                                     survive(&before, &requests, &cuts, seed, [OLD, NEW]);
                                     runs += 1;
@@ -289,7 +295,7 @@ fn cut_after_cut() {
     let befores = [flash_with_old(false), flash_with_old(true)];
     let update = update_to(NEW);
     let total = operations(&befores[0], &update);
-    for seed in 0..20_000 {
+    for seed in 0..10_000 * seeds() {
         let mut below = |limit: u64| random.next() % limit;
         let before = &befores[below(2) as usize];
         let first = match below(4) {
