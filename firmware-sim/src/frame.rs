@@ -38,6 +38,26 @@ pub fn checksum(bytes: &[u8]) -> u32 {
     CHECKSUM.checksum(bytes)
 }
 
+/// The same, piece by piece.
+pub struct RunningChecksum(crc::Digest<'static, u32>);
+
+impl RunningChecksum {
+    /// Of no bytes yet.
+    pub fn new() -> Self {
+        Self(CHECKSUM.digest())
+    }
+
+    /// Takes more bytes in.
+    pub fn add(&mut self, bytes: &[u8]) {
+        self.0.update(bytes);
+    }
+
+    /// The checksum of all of them.
+    pub fn finish(self) -> u32 {
+        self.0.finalize()
+    }
+}
+
 /// A refusal together with the sequence number to answer it under.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rejected {

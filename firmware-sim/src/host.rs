@@ -1,19 +1,25 @@
-//! The simulated device on the host: the application behind a TCP port, its flash in memory.
+//! The simulated device on the host: the application behind a TCP port, its flash simulated.
+//!
+//! One thread is the device: it owns the flash and answers one request after the other. Each peer has
+//! a thread with a session of its own, which hands requests over and waits for their answers.
 
 use std::io::{BufReader, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use crate::app::Device;
-use crate::port::{BlobStore, Clock, Link};
+use crate::flash_file;
+use crate::port::{Clock, Link};
 use crate::protocol::{Refusal, Reply, Request};
-use crate::session::{Responder, Session};
+use crate::session::{Paused, Responder, Session};
+use crate::sim_flash::SimFlash;
+use crate::storage::transfer::Peer;
 
-/// Size of a device's flash, bytes: that of the board which QEMU emulates.
-pub const FLASH_LENGTH: usize = 16 << 20;
+pub use crate::flash_file::FLASH_LENGTH;
 
 /// Peers at once; one more is turned away.
 const MAX_PEERS: usize = 16;
@@ -29,27 +35,31 @@ pub struct SimulatedDevice {
 }
 
 impl SimulatedDevice {
-    /// Starts one that listens on `listen` (port 0 takes a free one), with `flash` at the start of
-    /// its flash; the rest of the flash is zero, as in QEMU.
+    /// Starts one that listens on `listen` (port 0 takes a free one), with `blob` in the first slot
+    /// of a flash in memory; without any bytes, the flash is blank.
     ///
     /// # Errors
-    /// If the address cannot be listened on, or `flash` is longer than [`FLASH_LENGTH`].
-    pub fn start(listen: SocketAddr, flash: &[u8]) -> std::io::Result<Self> {
-        let Some(flash) = Flash::with_contents(flash) else {
-            let reason = format!(
-                "{} bytes are more than the flash has, {FLASH_LENGTH}",
-                flash.len()
-            );
-            return Err(std::io::Error::new(
-                std::io::ErrorKind::InvalidInput,
-                reason,
-            ));
-        };
+    /// If the address cannot be listened on, or `blob` is longer than a slot.
+    pub fn start(listen: SocketAddr, blob: &[u8]) -> std::io::Result<Self> {
+        let flash = flash_file::holding(blob, None);
+        let invalid = |error| std::io::Error::new(std::io::ErrorKind::InvalidInput, error);
+        Self::start_with(listen, flash.map_err(invalid)?)
+    }
+
+    /// The same with any flash, such as one that is kept in a file.
+    ///
+    /// # Errors
+    /// If the address cannot be listened on.
+    pub fn start_with(listen: SocketAddr, flash: SimFlash) -> std::io::Result<Self> {
         let listener = TcpListener::bind(listen)?;
         let address = listener.local_addr()?;
-        let server = thread::Builder::new()
+        let (asks, asked) = mpsc::channel();
+        thread::Builder::new()
             .name("device".into())
-            .spawn(move || serve(&listener, &flash))?;
+            .spawn(move || run(flash, &asked))?;
+        let server = thread::Builder::new()
+            .name("listener".into())
+            .spawn(move || accept(&listener, &asks))?;
         Ok(Self { address, server })
     }
 
@@ -65,53 +75,73 @@ impl SimulatedDevice {
     }
 }
 
-/// Accepts peers for good. All of them talk to the one device; each has its own session.
-fn serve(listener: &TcpListener, flash: &Flash) {
-    let device = Device::boot("firmware-sim host", flash, HostClock(Instant::now()));
-    let device = Mutex::new(device);
-    let peers = AtomicUsize::new(0);
-    thread::scope(|scope| {
-        for stream in listener.incoming() {
-            // A connection that failed before it was taken concerns nobody else.
-            let Ok(stream) = stream else { continue };
-            if peers.fetch_add(1, Ordering::Relaxed) >= MAX_PEERS {
-                peers.fetch_sub(1, Ordering::Relaxed);
-                continue;
-            }
-            let (device, peers) = (&device, &peers);
-            scope.spawn(move || {
-                // How a conversation ended is the peer's affair.
-                let _ = converse(stream, device);
-                peers.fetch_sub(1, Ordering::Relaxed);
-            });
-        }
-    });
+/// What a peer's thread hands to the device's.
+enum Ask {
+    Request {
+        peer: Peer,
+        request: Request,
+        answer: Sender<Reply>,
+    },
+    NoteRefused(Refusal),
 }
 
-fn converse(stream: TcpStream, device: &Mutex<Device<'_, HostClock>>) -> std::io::Result<()> {
+/// The device, until nobody can ask it any more.
+fn run(mut flash: SimFlash, asked: &Receiver<Ask>) {
+    let mut device = Device::new("firmware-sim host", HostClock(Instant::now()));
+    let mut regions = flash.regions();
+    loop {
+        let mut epoch = device.epoch(&mut regions);
+        while !epoch.is_over() {
+            match asked.recv() {
+                Ok(Ask::Request {
+                    peer,
+                    request,
+                    answer,
+                }) => {
+                    // A peer that has gone meanwhile does without.
+                    let _ = answer.send(epoch.respond_to(peer, &request));
+                }
+                Ok(Ask::NoteRefused(refusal)) => epoch.note_refused(refusal),
+                Err(_) => return,
+            }
+        }
+    }
+}
+
+/// Accepts peers for good. All of them talk to the one device; each has its own session.
+fn accept(listener: &TcpListener, asks: &Sender<Ask>) {
+    let peers = Arc::new(AtomicUsize::new(0));
+    let mut next_peer: Peer = 0;
+    for stream in listener.incoming() {
+        // A connection that failed before it was taken concerns nobody else.
+        let Ok(stream) = stream else { continue };
+        if peers.fetch_add(1, Ordering::Relaxed) >= MAX_PEERS {
+            peers.fetch_sub(1, Ordering::Relaxed);
+            continue;
+        }
+        next_peer = next_peer.wrapping_add(1);
+        let (asks, peers, peer) = (asks.clone(), Arc::clone(&peers), next_peer);
+        thread::spawn(move || {
+            // How a conversation ended is the peer's affair.
+            let _ = converse(stream, asks, peer);
+            peers.fetch_sub(1, Ordering::Relaxed);
+        });
+    }
+}
+
+fn converse(stream: TcpStream, asks: Sender<Ask>, peer: Peer) -> std::io::Result<Paused> {
     stream.set_nodelay(true)?;
     stream.set_read_timeout(Some(SILENCE_LIMIT))?;
     stream.set_write_timeout(Some(SILENCE_LIMIT))?;
-    Session::new().serve(&mut TcpLink(BufReader::new(stream)), &mut Shared(device))
-}
-
-/// Flash in memory: double words, because the runtime asks for a blob on a multiple of 8.
-struct Flash(Vec<u64>);
-
-impl Flash {
-    fn with_contents(contents: &[u8]) -> Option<Self> {
-        let mut words = vec![0; FLASH_LENGTH / 8];
-        bytemuck::cast_slice_mut(&mut words)
-            .get_mut(..contents.len())?
-            .copy_from_slice(contents);
-        Some(Self(words))
-    }
-}
-
-impl BlobStore for Flash {
-    fn active_blob(&self) -> &[u8] {
-        bytemuck::cast_slice(&self.0)
-    }
+    let (answer, answers) = mpsc::channel();
+    let mut shared = Shared {
+        asks,
+        peer,
+        answer,
+        answers,
+        is_gone: false,
+    };
+    Session::new().serve(&mut TcpLink(BufReader::new(stream)), &mut shared)
 }
 
 #[derive(Debug)]
@@ -138,20 +168,36 @@ impl Link for TcpLink {
 }
 
 /// One device, many sessions: they take turns, request by request.
-struct Shared<'a, 'f>(&'a Mutex<Device<'f, HostClock>>);
+struct Shared {
+    asks: Sender<Ask>,
+    peer: Peer,
+    answer: Sender<Reply>,
+    answers: Receiver<Reply>,
+    is_gone: bool,
+}
 
-impl Responder for Shared<'_, '_> {
+impl Responder for Shared {
     fn respond(&mut self, request: &Request) -> Reply {
-        self.0
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .respond(request)
+        let ask = Ask::Request {
+            peer: self.peer,
+            request: request.clone(),
+            answer: self.answer.clone(),
+        };
+        let asked = self.asks.send(ask).ok();
+        asked
+            .and_then(|()| self.answers.recv().ok())
+            .unwrap_or_else(|| {
+                // Only when the device's thread has ended, by a panic that was reported there.
+                self.is_gone = true;
+                Reply::Refused(Refusal::NoUpdate)
+            })
     }
 
     fn note_refused(&mut self, refusal: Refusal) {
-        self.0
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .note_refused(refusal);
+        let _ = self.asks.send(Ask::NoteRefused(refusal));
+    }
+
+    fn is_over(&self) -> bool {
+        self.is_gone
     }
 }

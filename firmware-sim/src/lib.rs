@@ -11,6 +11,7 @@ pub mod protocol;
 pub mod random;
 pub mod same_bits;
 pub mod session;
+pub mod storage;
 pub mod yardstick;
 
 #[cfg(feature = "std")]
@@ -18,6 +19,10 @@ pub mod client;
 #[cfg(feature = "std")]
 pub mod cost;
 #[cfg(feature = "std")]
+pub mod flash_file;
+#[cfg(feature = "std")]
 pub mod host;
 #[cfg(feature = "std")]
 pub mod qemu;
+#[cfg(feature = "std")]
+pub mod sim_flash;

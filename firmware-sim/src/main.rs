@@ -8,7 +8,9 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::{Parser, Subcommand};
 use firmware_sim::cost;
+use firmware_sim::flash_file::{self, FlashFile};
 use firmware_sim::host::SimulatedDevice;
+use firmware_sim::protocol::{CameraStatus, MAX_CAMERAS_LISTED, MAX_NAME, Rig, name};
 use firmware_sim::qemu::{self, QemuDevice};
 
 /// A measuring device, simulated.
@@ -55,10 +57,64 @@ struct DeviceArguments {
     /// The first line on standard output says which.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:0", value_parser = listen_address)]
     listen: SocketAddr,
-    /// What the device's flash holds from its start, such as a blob that `calib-offline calibrate`
-    /// wrote. Without it the flash is empty.
+    /// Where the device keeps its flash, across restarts; made when there is none. A blob that
+    /// `calib-offline calibrate` wrote can be given, too: the device starts with it, and the file stays
+    /// as it is. Without it the flash is in memory, and empty.
     #[arg(long, value_name = "FILE")]
     flash_file: Option<PathBuf>,
+    /// A camera that a new device is built with, such as left=1280x1024; once for each, in the blob's
+    /// order. Such a device refuses blobs for other cameras.
+    #[arg(long = "camera", value_name = "NAME=WIDTHxHEIGHT", value_parser = camera)]
+    cameras: Vec<CameraStatus>,
+    /// Serial number of a new device's rig.
+    #[arg(long, value_name = "TEXT", requires = "cameras")]
+    serial: Option<String>,
+}
+
+impl DeviceArguments {
+    fn rig(&self) -> anyhow::Result<Option<Rig>> {
+        if self.cameras.is_empty() {
+            return Ok(None);
+        }
+        let Ok(cameras) = heapless::Vec::from_slice(&self.cameras) else {
+            anyhow::bail!("a device has {MAX_CAMERAS_LISTED} cameras at most");
+        };
+        let serial = name(self.serial.as_deref().unwrap_or_default());
+        Ok(Some(Rig { serial, cameras }))
+    }
+
+    /// The flash that the device starts with, and the file that it is kept in.
+    fn flash(&self) -> anyhow::Result<FlashFile> {
+        let rig = self.rig()?;
+        let Some(path) = &self.flash_file else {
+            return Ok(FlashFile {
+                flash: flash_file::blank(rig.as_ref())?,
+                kept_in: None,
+            });
+        };
+        let file = FlashFile::open(path, rig.as_ref())?;
+        if file.kept_in.is_none() {
+            eprintln!(
+                "firmware-sim: {} is a blob, not the flash of a device: it stays as it is, and what the device is sent is forgotten when it stops. To keep it: --flash-file device.flash, then calib-offline flash {0} --device tcp:ADDRESS:PORT",
+                path.display()
+            );
+        }
+        Ok(file)
+    }
+}
+
+fn camera(text: &str) -> Result<CameraStatus, String> {
+    let parse = || {
+        let (camera, size) = text.rsplit_once('=')?;
+        let (width, height) = size.split_once('x')?;
+        let is_fit = !camera.is_empty() && camera.len() <= MAX_NAME;
+        is_fit.then_some(CameraStatus {
+            name: name(camera),
+            width_px: width.parse().ok().filter(|&px| px > 0)?,
+            height_px: height.parse().ok().filter(|&px| px > 0)?,
+        })
+    };
+    parse().ok_or_else(|| "give NAME=WIDTHxHEIGHT, such as left=1280x1024".to_owned())
 }
 
 fn listen_address(text: &str) -> Result<SocketAddr, String> {
@@ -108,16 +164,12 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 fn run_on_host(arguments: &DeviceArguments) -> anyhow::Result<()> {
-    let flash = match &arguments.flash_file {
-        Some(path) => {
-            std::fs::read(path).with_context(|| format!("the flash file {}", path.display()))?
-        }
-        None => Vec::new(),
-    };
-    let device = SimulatedDevice::start(arguments.listen, &flash)
+    let FlashFile { flash, kept_in } = arguments.flash()?;
+    let device = SimulatedDevice::start_with(arguments.listen, flash)
         .with_context(|| format!("the device on {}", arguments.listen))?;
     announce(device.address())?;
     device.serve_forever();
+    drop(kept_in);
     anyhow::bail!("the device stopped")
 }
 

@@ -1,8 +1,9 @@
-//! What the application needs from the machine it runs on: a byte stream, the blob in its flash,
-//! and a clock.
+//! What the application needs from the machine it runs on: a byte stream, flash, and a clock.
 //!
-//! The host implements these with a TCP stream and a file, the Cortex-M image with a UART,
+//! The host implements these with a TCP stream and a simulated flash, the Cortex-M image with a UART,
 //! memory-mapped flash and a timer.
+
+use embedded_storage::nor_flash::NorFlash;
 
 /// A byte stream to the other side, reliable or not.
 pub trait Link {
@@ -23,11 +24,23 @@ pub trait Link {
     fn write_all(&mut self, bytes: &[u8]) -> Result<(), Self::Error>;
 }
 
-/// Where the blob lies: flash that can be read like memory.
-pub trait BlobStore {
-    /// The flash from the first byte of the active blob on. What follows the blob is of no account;
-    /// flash without a blob is given as it is, and the runtime says what is wrong with it.
-    fn active_blob(&self) -> &[u8];
+/// A part of the flash of its own: NOR flash that is programmed through a driver and read like
+/// memory.
+///
+/// Addresses count from the start of the region. Whoever borrows [`MappedFlash::mapped`] keeps the
+/// region from being written: that is how the blob in use stays untouched while another is stored.
+pub trait MappedFlash: NorFlash {
+    /// All of the region, on an address that is a multiple of 8.
+    fn mapped(&self) -> &[u8];
+}
+
+/// The flash of a device: the factory record's block and the two slots.
+#[derive(Debug)]
+pub struct Regions<R> {
+    /// One erase block: what the device knows of its own cameras. Never written by the application.
+    pub factory: R,
+    /// The slots, of the same size.
+    pub slots: [R; 2],
 }
 
 /// Time since the device started.

@@ -19,13 +19,57 @@ pub trait Responder {
 
     /// Takes note of a frame that was refused before it became a request.
     fn note_refused(&mut self, refusal: Refusal);
+
+    /// Whether somebody else must answer from now on: another blob became active.
+    fn is_over(&self) -> bool;
 }
 
-/// The frame buffers of one link; about 3 KiB, with no allocation.
+/// The frame buffers of one link; about 3 KiB, with no allocation. It outlives the responders, so that
+/// nothing that has arrived is lost between two of them.
 #[derive(Debug, Default)]
 pub struct Session {
     reader: FrameReader,
     writer: FrameWriter,
+    arrived: Arrived,
+}
+
+/// Bytes that have arrived and were not looked at yet.
+#[derive(Debug)]
+struct Arrived {
+    bytes: [u8; 64],
+    start: usize,
+    end: usize,
+}
+
+impl Default for Arrived {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Arrived {
+    const fn new() -> Self {
+        Self {
+            bytes: [0; 64],
+            start: 0,
+            end: 0,
+        }
+    }
+
+    fn next(&mut self) -> Option<u8> {
+        let byte = *self.bytes.get(self.start..self.end)?.first()?;
+        self.start += 1;
+        Some(byte)
+    }
+}
+
+/// Why a conversation paused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Paused {
+    /// The other side closed the link.
+    Closed,
+    /// [`Responder::is_over`].
+    Over,
 }
 
 impl Session {
@@ -34,6 +78,7 @@ impl Session {
         Self {
             reader: FrameReader::new(),
             writer: FrameWriter::new(),
+            arrived: Arrived::new(),
         }
     }
 
@@ -49,7 +94,7 @@ impl Session {
         self.writer.seal(sequence, &reply)
     }
 
-    /// Converses until the other side closes the link.
+    /// Converses until the other side closes the link, or until this responder's time is over.
     ///
     /// # Errors
     /// If the link broke.
@@ -57,17 +102,20 @@ impl Session {
         &mut self,
         link: &mut L,
         responder: &mut impl Responder,
-    ) -> Result<(), L::Error> {
-        let mut arrived = [0; 64];
+    ) -> Result<Paused, L::Error> {
         loop {
-            let count = link.read(&mut arrived)?;
-            if count == 0 {
-                return Ok(());
-            }
-            for &byte in arrived.iter().take(count) {
+            while let Some(byte) = self.arrived.next() {
                 if let Some(frame) = self.feed(byte, responder) {
                     link.write_all(frame)?;
                 }
+                if responder.is_over() {
+                    return Ok(Paused::Over);
+                }
+            }
+            self.arrived.start = 0;
+            self.arrived.end = link.read(&mut self.arrived.bytes)?;
+            if self.arrived.end == 0 {
+                return Ok(Paused::Closed);
             }
         }
     }

@@ -3,19 +3,14 @@
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{Device, open};
+use ray_runtime::OpenError;
+
+use super::Device;
 use crate::frame::{FrameReader, FrameWriter, Received};
-use crate::port::{BlobStore, Clock};
-use crate::protocol::{Match, Refusal, Reply, Request, Sighting};
-use crate::session::Session;
-
-struct NoFlash;
-
-impl BlobStore for NoFlash {
-    fn active_blob(&self) -> &[u8] {
-        &[]
-    }
-}
+use crate::port::Clock;
+use crate::protocol::{Match, NewBlob, Refusal, Reply, Request, Sighting, name};
+use crate::session::{Responder, Session};
+use crate::sim_flash::SimFlash;
 
 struct Stopped;
 
@@ -28,7 +23,7 @@ impl Clock for Stopped {
 /// Feeds `bytes` to a session and returns the answers to it.
 fn answers(
     session: &mut Session,
-    device: &mut Device<'_, Stopped>,
+    device: &mut impl Responder,
     bytes: &[u8],
 ) -> Vec<Received<Reply>> {
     let mut reader = FrameReader::new();
@@ -53,9 +48,12 @@ fn sealed(sequence: u16, request: &Request) -> Vec<u8> {
 
 #[test]
 fn without_a_blob_it_answers_and_says_so() {
-    let mut device = Device::boot("a device", &NoFlash, Stopped);
+    let mut flash = SimFlash::blank(5, 0).unwrap();
+    let mut regions = flash.regions();
+    let mut device = Device::new("a device", Stopped);
+    let mut device = device.epoch(&mut regions);
     let mut session = Session::new();
-    let open_error = open(&[]).unwrap_err().code();
+    let open_error = OpenError::BadMagic { found: 0 }.code();
 
     let mut bytes = sealed(1, &Request::Measure(heapless::Vec::new()));
     bytes.extend(sealed(2, &Request::Status));
@@ -81,7 +79,10 @@ fn without_a_blob_it_answers_and_says_so() {
 #[test]
 fn noise_never_stops_it() {
     let mut random = ChaCha8Rng::seed_from_u64(2);
-    let mut device = Device::boot("a device", &NoFlash, Stopped);
+    let mut flash = SimFlash::blank(5, 0).unwrap();
+    let mut regions = flash.regions();
+    let mut device = Device::new("a device", Stopped);
+    let mut device = device.epoch(&mut regions);
     let mut session = Session::new();
     let sighting = Sighting {
         camera: 0,
@@ -147,14 +148,17 @@ fn noise_never_stops_it() {
 #[test]
 fn made_up_bodies_never_stop_it() {
     let mut random = ChaCha8Rng::seed_from_u64(3);
-    let mut device = Device::boot("a device", &NoFlash, Stopped);
+    let mut flash = SimFlash::blank(5, 0).unwrap();
+    let mut regions = flash.regions();
+    let mut device = Device::new("a device", Stopped);
+    let mut device = device.epoch(&mut regions);
     let mut session = Session::new();
     let mut understood = 0;
     for round in 0..20_000_u32 {
         // The first byte is a request that exists, more often than not.
         let mut body = noise(&mut random, 120);
         if let Some(first) = body.first_mut() {
-            *first %= 4;
+            *first %= 9;
         }
         let frame = FrameWriter::new().seal(4, &Raw(&body)).unwrap().to_vec();
         let answers = answers(&mut session, &mut device, &frame);
@@ -165,6 +169,161 @@ fn made_up_bodies_never_stop_it() {
         }
     }
     assert!(understood > 0, "no body got past the decoder");
+}
+
+fn new_blob(length: u32, checksum: u32) -> NewBlob {
+    NewBlob {
+        length,
+        checksum,
+        identity: [0; 16],
+        rig_serial: None,
+    }
+}
+
+/// A clock that the test sets.
+struct Hand<'a>(&'a core::cell::Cell<u64>);
+
+impl Clock for Hand<'_> {
+    fn uptime_ms(&mut self) -> u64 {
+        self.0.get()
+    }
+}
+
+#[test]
+fn another_peers_update_is_in_the_way_until_it_has_been_silent_for_a_while() {
+    let now_ms = core::cell::Cell::new(0);
+    let mut flash = SimFlash::blank(5, 0).unwrap();
+    let mut regions = flash.regions();
+    let mut device = Device::new("a device", Hand(&now_ms));
+    let mut device = device.epoch(&mut regions);
+    let [one, other] = [1, 2].map(|sum| Request::BeginUpdate(new_blob(100, sum)));
+    let receiving = |received| Reply::Receiving { received };
+    let chunk = Request::Chunk(crate::protocol::Chunk {
+        offset: 0,
+        bytes: core::iter::repeat_n(7, 16).collect(),
+    });
+
+    assert_eq!(device.respond_to(1, &one), receiving(0));
+    now_ms.set(4000);
+    assert_eq!(device.respond_to(1, &chunk), receiving(16));
+    now_ms.set(8500);
+    let busy = Reply::Refused(Refusal::Busy { wait_ms: 500 });
+    for request in [&other, &Request::AbortUpdate, &Request::Rollback] {
+        assert_eq!(device.respond_to(2, request), busy);
+    }
+    let none = Reply::Refused(Refusal::NoUpdate);
+    assert_eq!(device.respond_to(2, &chunk), none);
+    assert_eq!(device.respond_to(2, &Request::FinishUpdate), none);
+    // The same blob goes on over another connection, and the old one is out of it.
+    assert_eq!(device.respond_to(3, &one), receiving(16));
+    assert_eq!(device.respond_to(1, &Request::FinishUpdate), none);
+    now_ms.set(13_500);
+    assert_eq!(device.respond_to(2, &other), receiving(0));
+    // A peer may always begin anew.
+    assert_eq!(device.respond_to(2, &one), receiving(0));
+    assert_eq!(device.respond_to(2, &Request::AbortUpdate), Reply::Aborted);
+    assert_eq!(device.respond_to(2, &chunk), none);
+}
+
+#[test]
+fn chunks_come_in_order_in_whole_units_and_a_repeat_is_acknowledged() {
+    let mut flash = SimFlash::blank(5, 0).unwrap();
+    let mut regions = flash.regions();
+    let mut device = Device::new("a device", Stopped);
+    let mut device = device.epoch(&mut regions);
+    let begin = Request::BeginUpdate(new_blob(30, 1));
+    device.respond_to(0, &begin);
+    let mut send = |offset, fill: u8, length| {
+        let bytes = core::iter::repeat_n(fill, length).collect();
+        device.respond_to(0, &Request::Chunk(crate::protocol::Chunk { offset, bytes }))
+    };
+    let bad = |missing| Reply::Refused(Refusal::BadChunk { missing });
+    let expects = |expected| Reply::Refused(Refusal::WrongOffset { expected });
+    let receiving = |received| Reply::Receiving { received };
+    assert_eq!(send(0, 1, 0), bad(30));
+    assert_eq!(send(0, 1, 7), bad(30));
+    assert_eq!(send(0, 1, 31), bad(30));
+    assert_eq!(send(8, 1, 8), expects(0));
+    assert_eq!(send(0, 1, 16), receiving(16));
+    assert_eq!(send(0, 1, 16), receiving(16), "a repeat");
+    assert_eq!(send(0, 2, 16), expects(16), "other bytes");
+    assert_eq!(send(0, 1, 8), expects(16), "a part of it");
+    assert_eq!(send(u32::MAX, 1, 8), expects(16));
+    assert_eq!(send(16, 3, 8), receiving(24));
+    assert_eq!(send(0, 1, 16), expects(24), "a repeat of an earlier one");
+    assert_eq!(
+        device.respond_to(0, &Request::FinishUpdate),
+        Reply::Refused(Refusal::Incomplete { received: 24 })
+    );
+    let last = Request::Chunk(crate::protocol::Chunk {
+        offset: 24,
+        bytes: core::iter::repeat_n(3, 6).collect(),
+    });
+    assert_eq!(device.respond_to(0, &last), receiving(30));
+    let Reply::Refused(Refusal::ChecksumMismatch { announced, stored }) =
+        device.respond_to(0, &Request::FinishUpdate)
+    else {
+        panic!("another checksum was announced");
+    };
+    let sent = [vec![1; 16], vec![3; 14]].concat();
+    assert_eq!((announced, stored), (1, crate::frame::checksum(&sent)));
+    // Given up with that.
+    let none = Reply::Refused(Refusal::NoUpdate);
+    assert_eq!(device.respond_to(0, &Request::FinishUpdate), none);
+
+    // What has the announced checksum must still be a blob.
+    let begin = Request::BeginUpdate(new_blob(30, stored));
+    for request in [begin, Request::AbortUpdate] {
+        assert!(!matches!(device.respond_to(0, &request), Reply::Refused(_)));
+    }
+}
+
+#[test]
+fn what_cannot_fit_or_is_for_another_rig_is_refused_before_anything_is_erased() {
+    let mut flash = SimFlash::blank(5, 0).unwrap();
+    let own = crate::protocol::Rig {
+        serial: name("17"),
+        cameras: heapless::Vec::new(),
+    };
+    crate::storage::rig::write(&mut flash.regions().factory, &own).unwrap();
+    let mut regions = flash.regions();
+    let mut device = Device::new("a device", Stopped);
+    let mut device = device.epoch(&mut regions);
+    let mut begin = |length, serial: Option<&str>| {
+        let new = NewBlob {
+            rig_serial: serial.map(name),
+            ..new_blob(length, 1)
+        };
+        device.respond_to(0, &Request::BeginUpdate(new))
+    };
+    let limit = 4096;
+    assert_eq!(
+        begin(limit + 1, None),
+        Reply::Refused(Refusal::TooLong { limit })
+    );
+    assert_eq!(
+        begin(u32::MAX, None),
+        Reply::Refused(Refusal::TooLong { limit })
+    );
+    assert_eq!(
+        begin(23, None),
+        Reply::Refused(Refusal::NotABlob { open_error: 1 })
+    );
+    assert!(matches!(
+        begin(limit, Some("18")),
+        Reply::Refused(Refusal::OtherRig { .. })
+    ));
+    drop(device);
+    assert_eq!(flash.wear(), [0; 5]);
+    let mut regions = flash.regions();
+    let mut device = Device::new("a device", Stopped);
+    let mut device = device.epoch(&mut regions);
+    let new = NewBlob {
+        rig_serial: Some(name("17")),
+        ..new_blob(limit, 1)
+    };
+    let begun = device.respond_to(0, &Request::BeginUpdate(new));
+    assert_eq!(begun, Reply::Receiving { received: 0 });
 }
 
 fn noise(random: &mut ChaCha8Rng, max_length: usize) -> Vec<u8> {

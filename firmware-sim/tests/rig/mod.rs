@@ -1,5 +1,6 @@
 //! A stereo blob made by hand from the runtime's schema, and matches on it: small, but with a
 //! central and a non-central camera, knots and nodes that no formula gives, and a hole in a mask.
+#![allow(dead_code, reason = "each test takes what it needs")]
 
 use firmware_sim::protocol::{Match, Sighting};
 use rand::{RngExt, SeedableRng};
@@ -30,8 +31,13 @@ const fn spline(is_central: bool) -> Encoding {
 
 /// The blob's bytes.
 pub fn blob() -> Vec<u8> {
+    blob_of(IDENTITY)
+}
+
+/// The same rig under another identity.
+pub fn blob_of(identity: [u8; 16]) -> Vec<u8> {
     let mut meta = encoded(&Meta {
-        identity: &IDENTITY,
+        identity: &identity,
         frame: "rig",
         written_by: "a test",
         pixel_convention: PixelConvention::TopLeftPixelCenter,
