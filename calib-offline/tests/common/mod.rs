@@ -45,16 +45,25 @@ impl Run {
         self
     }
 
+    /// On standard error.
     #[track_caller]
     pub fn assert_says(&self, parts: &[&str]) -> &Self {
-        for part in parts {
-            assert!(
-                self.stderr.contains(part),
-                "{part:?} is not in:\n{}",
-                self.stderr
-            );
-        }
+        assert_contains(&self.stderr, parts);
         self
+    }
+
+    /// On standard output.
+    #[track_caller]
+    pub fn assert_prints(&self, parts: &[&str]) -> &Self {
+        assert_contains(&self.stdout, parts);
+        self
+    }
+}
+
+#[track_caller]
+fn assert_contains(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "{part:?} is not in:\n{text}");
     }
 }
 
