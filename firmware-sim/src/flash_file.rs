@@ -74,7 +74,16 @@ pub struct FlashFile {
     /// The flash; it writes to its file whatever changes, unless that is a plain blob.
     pub flash: SimFlash,
     /// The file, locked for as long as this lives; `None` if nothing is kept.
-    pub kept_in: Option<File>,
+    pub kept_in: Option<Kept>,
+}
+
+/// A file that a flash is kept in.
+#[derive(Debug)]
+pub struct Kept {
+    /// Where it is.
+    pub path: PathBuf,
+    /// Holds the lock.
+    _file: File,
 }
 
 /// An empty flash in memory that knows these cameras.
@@ -122,6 +131,14 @@ pub fn holding(blob: &[u8], own: Option<&Rig>) -> Result<SimFlash, FlashFileErro
 }
 
 impl FlashFile {
+    /// A flash that is forgotten when its device stops.
+    pub fn in_memory(flash: SimFlash) -> Self {
+        Self {
+            flash,
+            kept_in: None,
+        }
+    }
+
     /// Opens the flash in `path`. One that does not exist, or is empty, is made, blank but for the
     /// record of the device's own cameras. A plain blob is left as it is: the device starts with it in
     /// a flash in memory.
@@ -141,10 +158,7 @@ impl FlashFile {
         file.read_to_end(&mut contents).map_err(failed)?;
         if contents.starts_with(&ray_runtime::format::MAGIC) {
             let flash = holding(&contents, own)?;
-            return Ok(Self {
-                flash,
-                kept_in: None,
-            });
+            return Ok(Self::in_memory(flash));
         }
         if !matches!(contents.len(), 0 | FLASH_LENGTH) {
             return Err(FlashFileError::Unknown {
@@ -176,7 +190,10 @@ impl FlashFile {
         flash.write_through(file.try_clone().map_err(failed)?);
         Ok(Self {
             flash,
-            kept_in: Some(file),
+            kept_in: Some(Kept {
+                path: path.to_owned(),
+                _file: file,
+            }),
         })
     }
 }
