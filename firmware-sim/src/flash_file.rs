@@ -4,6 +4,8 @@
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use ray_runtime::RayBlob;
 use thiserror::Error;
@@ -82,8 +84,8 @@ pub struct FlashFile {
 pub struct Kept {
     /// Where it is.
     pub path: PathBuf,
-    /// Holds the lock.
-    _file: File,
+    /// Holds the lock for as long as it, or a copy of it in another process, is open. Read-only.
+    pub(crate) lock: File,
 }
 
 /// An empty flash in memory that knows these cameras.
@@ -166,9 +168,10 @@ impl FlashFile {
                 length: contents.len(),
             });
         }
+        let locked = File::open(path).map_err(failed)?;
+        lock(&locked, path)?;
         let mut options = OpenOptions::new();
         let mut file = options.read(true).write(true).open(path).map_err(failed)?;
-        lock(&file, path)?;
         // Once more, now that nobody else can be writing.
         contents.clear();
         file.read_to_end(&mut contents).map_err(failed)?;
@@ -187,12 +190,12 @@ impl FlashFile {
                 length: contents.len(),
             })?
         };
-        flash.write_through(file.try_clone().map_err(failed)?);
+        flash.write_through(file);
         Ok(Self {
             flash,
             kept_in: Some(Kept {
                 path: path.to_owned(),
-                _file: file,
+                lock: locked,
             }),
         })
     }
@@ -206,15 +209,28 @@ fn make(path: &Path) -> std::io::Result<()> {
     }
 }
 
+/// How long the device before, which may have been killed just now, is given to end.
+const LOCK_PATIENCE: Duration = Duration::from_secs(1);
+
 fn lock(file: &File, path: &Path) -> Result<(), FlashFileError> {
-    match file.try_lock() {
-        Ok(()) => Ok(()),
-        Err(TryLockError::WouldBlock) => Err(FlashFileError::InUse {
-            path: path.to_owned(),
-        }),
-        Err(TryLockError::Error(source)) => Err(FlashFileError::Io {
-            path: path.to_owned(),
-            source,
-        }),
+    let deadline = Instant::now() + LOCK_PATIENCE;
+    loop {
+        match file.try_lock() {
+            Ok(()) => return Ok(()),
+            Err(TryLockError::WouldBlock) if Instant::now() < deadline => {
+                thread::sleep(Duration::from_millis(20));
+            }
+            Err(TryLockError::WouldBlock) => {
+                return Err(FlashFileError::InUse {
+                    path: path.to_owned(),
+                });
+            }
+            Err(TryLockError::Error(source)) => {
+                return Err(FlashFileError::Io {
+                    path: path.to_owned(),
+                    source,
+                });
+            }
+        }
     }
 }

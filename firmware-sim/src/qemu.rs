@@ -129,6 +129,15 @@ impl Backing {
         Ok(Self::Forgotten(file))
     }
 
+    /// For QEMU as its standard output, to which it writes nothing: a copy of the lock, so that the
+    /// file stays locked until QEMU has ended, should this process be killed.
+    fn lock(&self) -> std::io::Result<Stdio> {
+        match self {
+            Self::Kept(kept) => Ok(kept.lock.try_clone()?.into()),
+            Self::Forgotten(_) => Ok(std::io::stderr().into()),
+        }
+    }
+
     fn path(&self) -> &Path {
         match self {
             Self::Kept(kept) => &kept.path,
@@ -212,14 +221,15 @@ impl QemuDevice {
             "-serial",
             &format!("tcp:{address},server=on,wait=off,nodelay=on"),
         ]);
+        let not_started = |source| QemuError::Io {
+            what: "starting QEMU through sh".into(),
+            source,
+        };
         let child = command
             .stdin(Stdio::piped())
-            .stdout(std::io::stderr())
+            .stdout(backing.lock().map_err(not_started)?)
             .spawn()
-            .map_err(|source| QemuError::Io {
-                what: "starting QEMU through sh".into(),
-                source,
-            })?;
+            .map_err(not_started)?;
         let mut device = Self {
             child,
             address,

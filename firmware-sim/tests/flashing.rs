@@ -309,7 +309,7 @@ fn a_device_that_is_killed_keeps_one_of_the_two_blobs() {
         let mut device = Running::keeping("host", &file, &[]);
         let new = identity_of(number);
         let mut client = device.client();
-        let pause = Duration::from_micros(random.random_range(0..8000));
+        let pause = Duration::from_micros(random.random_range(0..4000));
         let killer = thread::spawn(move || {
             thread::sleep(pause);
             device.process.kill().unwrap();

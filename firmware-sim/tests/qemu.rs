@@ -158,6 +158,37 @@ fn the_self_tests_of_a_golden_blob_hold_on_the_cortex_m4f() {
     }
 }
 
+/// Killed in the midst of an update, QEMU ends, too, and the file is free again.
+#[test]
+fn a_cortex_m_that_is_killed_keeps_one_of_the_two_blobs() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("device.flash");
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let options = FlashOptions {
+        retries: 0,
+        ..FlashOptions::default()
+    };
+    let mut before = None;
+    for number in 0..6_u8 {
+        let mut device = Running::keeping("qemu", &file, &[]);
+        let mut client = device.client();
+        let found = client.status().unwrap().blob.ok().map(|blob| blob.identity);
+        assert!(number == 0 || found == before || found == Some([number - 1; 16]));
+        before = found;
+        let pause = Duration::from_millis(random.random_range(0..250));
+        let killer = std::thread::spawn(move || {
+            std::thread::sleep(pause);
+            device.process.kill().unwrap();
+            device.process.wait().unwrap();
+        });
+        let blob = rig::blob_of([number; 16]);
+        if client.flash(&blob, &options, &mut |_| {}).is_ok() {
+            before = Some([number; 16]);
+        }
+        killer.join().unwrap();
+    }
+}
+
 /// However it ends: here it is killed, which it cannot answer in any way.
 #[test]
 fn qemu_ends_with_its_parent() {
