@@ -4,6 +4,8 @@
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use ray_runtime::RayBlob;
 use thiserror::Error;
@@ -74,7 +76,16 @@ pub struct FlashFile {
     /// The flash; it writes to its file whatever changes, unless that is a plain blob.
     pub flash: SimFlash,
     /// The file, locked for as long as this lives; `None` if nothing is kept.
-    pub kept_in: Option<File>,
+    pub kept_in: Option<Kept>,
+}
+
+/// A file that a flash is kept in.
+#[derive(Debug)]
+pub struct Kept {
+    /// Where it is.
+    pub path: PathBuf,
+    /// Holds the lock for as long as it, or a copy of it in another process, is open. Read-only.
+    pub(crate) lock: File,
 }
 
 /// An empty flash in memory that knows these cameras.
@@ -122,6 +133,14 @@ pub fn holding(blob: &[u8], own: Option<&Rig>) -> Result<SimFlash, FlashFileErro
 }
 
 impl FlashFile {
+    /// A flash that is forgotten when its device stops.
+    pub fn in_memory(flash: SimFlash) -> Self {
+        Self {
+            flash,
+            kept_in: None,
+        }
+    }
+
     /// Opens the flash in `path`. One that does not exist, or is empty, is made, blank but for the
     /// record of the device's own cameras. A plain blob is left as it is: the device starts with it in
     /// a flash in memory.
@@ -141,10 +160,7 @@ impl FlashFile {
         file.read_to_end(&mut contents).map_err(failed)?;
         if contents.starts_with(&ray_runtime::format::MAGIC) {
             let flash = holding(&contents, own)?;
-            return Ok(Self {
-                flash,
-                kept_in: None,
-            });
+            return Ok(Self::in_memory(flash));
         }
         if !matches!(contents.len(), 0 | FLASH_LENGTH) {
             return Err(FlashFileError::Unknown {
@@ -152,9 +168,10 @@ impl FlashFile {
                 length: contents.len(),
             });
         }
+        let locked = File::open(path).map_err(failed)?;
+        lock(&locked, path)?;
         let mut options = OpenOptions::new();
         let mut file = options.read(true).write(true).open(path).map_err(failed)?;
-        lock(&file, path)?;
         // Once more, now that nobody else can be writing.
         contents.clear();
         file.read_to_end(&mut contents).map_err(failed)?;
@@ -173,10 +190,13 @@ impl FlashFile {
                 length: contents.len(),
             })?
         };
-        flash.write_through(file.try_clone().map_err(failed)?);
+        flash.write_through(file);
         Ok(Self {
             flash,
-            kept_in: Some(file),
+            kept_in: Some(Kept {
+                path: path.to_owned(),
+                lock: locked,
+            }),
         })
     }
 }
@@ -189,15 +209,28 @@ fn make(path: &Path) -> std::io::Result<()> {
     }
 }
 
+/// How long the device before, which may have been killed just now, is given to end.
+const LOCK_PATIENCE: Duration = Duration::from_secs(1);
+
 fn lock(file: &File, path: &Path) -> Result<(), FlashFileError> {
-    match file.try_lock() {
-        Ok(()) => Ok(()),
-        Err(TryLockError::WouldBlock) => Err(FlashFileError::InUse {
-            path: path.to_owned(),
-        }),
-        Err(TryLockError::Error(source)) => Err(FlashFileError::Io {
-            path: path.to_owned(),
-            source,
-        }),
+    let deadline = Instant::now() + LOCK_PATIENCE;
+    loop {
+        match file.try_lock() {
+            Ok(()) => return Ok(()),
+            Err(TryLockError::WouldBlock) if Instant::now() < deadline => {
+                thread::sleep(Duration::from_millis(20));
+            }
+            Err(TryLockError::WouldBlock) => {
+                return Err(FlashFileError::InUse {
+                    path: path.to_owned(),
+                });
+            }
+            Err(TryLockError::Error(source)) => {
+                return Err(FlashFileError::Io {
+                    path: path.to_owned(),
+                    source,
+                });
+            }
+        }
     }
 }

@@ -87,10 +87,7 @@ impl DeviceArguments {
     fn flash(&self) -> anyhow::Result<FlashFile> {
         let rig = self.rig()?;
         let Some(path) = &self.flash_file else {
-            return Ok(FlashFile {
-                flash: flash_file::blank(rig.as_ref())?,
-                kept_in: None,
-            });
+            return Ok(FlashFile::in_memory(flash_file::blank(rig.as_ref())?));
         };
         let file = FlashFile::open(path, rig.as_ref())?;
         if file.kept_in.is_none() {
@@ -176,13 +173,14 @@ fn run_on_host(arguments: &DeviceArguments) -> anyhow::Result<()> {
 fn run_in_qemu(arguments: &DeviceArguments, image: Option<&Path>) -> anyhow::Result<()> {
     // Before the image, whose first build takes a minute.
     qemu::require_qemu()?;
+    let flash = arguments.flash()?;
     let image = if let Some(path) = image {
         path.to_owned()
     } else {
         eprintln!("firmware-sim: building the image, unless it is up to date");
         qemu::build_image("device")?
     };
-    let device = QemuDevice::start(arguments.listen, &image, arguments.flash_file.as_deref())?;
+    let device = QemuDevice::start_with(arguments.listen, &image, flash)?;
     announce(device.address())?;
     let status = device.wait()?;
     anyhow::bail!("QEMU stopped ({status})")

@@ -1,17 +1,18 @@
 //! The same application as a Cortex-M4F image in QEMU, its UART on a TCP port.
 
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Write};
 use std::net::{SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
-use std::sync::mpsc;
+use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use tempfile::NamedTempFile;
 use thiserror::Error;
 
 use crate::client::{ClientError, DeviceClient};
-use crate::host::FLASH_LENGTH;
+use crate::flash_file::{self, FLASH_LENGTH, FlashFile, FlashFileError, Kept};
 
 /// Where the emulated flash starts in the board's memory.
 const FLASH_START: usize = 0x2100_0000;
@@ -72,6 +73,9 @@ pub enum QemuError {
         /// What the system says.
         source: std::io::Error,
     },
+    /// The file cannot be the device's flash.
+    #[error(transparent)]
+    FlashFile(#[from] FlashFileError),
     /// The contents for the flash are too long.
     #[error("{} has {length} bytes, and the flash only {FLASH_LENGTH}", path.display())]
     FlashTooLong {
@@ -104,11 +108,48 @@ pub enum QemuError {
 pub struct QemuDevice {
     child: Child,
     address: SocketAddr,
+    /// Held until QEMU has ended.
+    _flash: Arc<Backing>,
+}
+
+/// The file that QEMU maps as the board's flash.
+#[derive(Debug)]
+enum Backing {
+    Kept(Kept),
+    Forgotten(NamedTempFile),
+}
+
+impl Backing {
+    fn of(FlashFile { flash, kept_in }: FlashFile) -> std::io::Result<Self> {
+        if let Some(kept) = kept_in {
+            return Ok(Self::Kept(kept));
+        }
+        let mut file = NamedTempFile::new()?;
+        file.write_all(flash.contents())?;
+        Ok(Self::Forgotten(file))
+    }
+
+    /// For QEMU as its standard output, to which it writes nothing: a copy of the lock, so that the
+    /// file stays locked until QEMU has ended, should this process be killed.
+    fn lock(&self) -> std::io::Result<Stdio> {
+        match self {
+            Self::Kept(kept) => Ok(kept.lock.try_clone()?.into()),
+            Self::Forgotten(_) => Ok(std::io::stderr().into()),
+        }
+    }
+
+    fn path(&self) -> &Path {
+        match self {
+            Self::Kept(kept) => &kept.path,
+            Self::Forgotten(file) => file.path(),
+        }
+    }
 }
 
 impl QemuDevice {
-    /// Starts `image` with its UART on `listen` (port 0 takes a free one) and the contents of
-    /// `flash_file` at the start of its flash. Returns once the device has answered.
+    /// Starts `image` with its UART on `listen` (port 0 takes a free one) and its flash in
+    /// `flash_file`, as [`FlashFile::open`] takes it; without one, the flash is blank and in memory.
+    /// Returns once the device has answered.
     ///
     /// # Errors
     /// [`QemuError`].
@@ -117,11 +158,32 @@ impl QemuDevice {
         image: &Path,
         flash_file: Option<&Path>,
     ) -> Result<Self, QemuError> {
+        let flash = match flash_file {
+            Some(path) => FlashFile::open(path, None)?,
+            None => FlashFile::in_memory(flash_file::blank(None)?),
+        };
+        Self::start_with(listen, image, flash)
+    }
+
+    /// The same with a flash that has been opened.
+    ///
+    /// # Errors
+    /// [`QemuError`].
+    pub fn start_with(
+        listen: SocketAddr,
+        image: &Path,
+        flash: FlashFile,
+    ) -> Result<Self, QemuError> {
         require_qemu()?;
+        let backing = Backing::of(flash).map_err(|source| QemuError::Io {
+            what: "a temporary file for the flash".into(),
+            source,
+        })?;
+        let backing = Arc::new(backing);
         let tries = if listen.port() == 0 { PORT_TRIES } else { 1 };
         let mut tried = 1;
         loop {
-            match Self::start_on(free_address(listen)?, image, flash_file) {
+            match Self::start_on(free_address(listen)?, image, &backing) {
                 Err(QemuError::Ended { .. }) if tried < tries => tried += 1,
                 outcome => return outcome,
             }
@@ -151,23 +213,28 @@ impl QemuDevice {
     fn start_on(
         address: SocketAddr,
         image: &Path,
-        flash_file: Option<&Path>,
+        backing: &Arc<Backing>,
     ) -> Result<Self, QemuError> {
-        let mut command = qemu_command(image, flash_file)?;
+        let mut command = qemu_command(image, &Memory::File(backing.path()))?;
         command.args(["-monitor", "none"]);
         command.args([
             "-serial",
             &format!("tcp:{address},server=on,wait=off,nodelay=on"),
         ]);
+        let not_started = |source| QemuError::Io {
+            what: "starting QEMU through sh".into(),
+            source,
+        };
         let child = command
             .stdin(Stdio::piped())
-            .stdout(std::io::stderr())
+            .stdout(backing.lock().map_err(not_started)?)
             .spawn()
-            .map_err(|source| QemuError::Io {
-                what: "starting QEMU through sh".into(),
-                source,
-            })?;
-        let mut device = Self { child, address };
+            .map_err(not_started)?;
+        let mut device = Self {
+            child,
+            address,
+            _flash: Arc::clone(backing),
+        };
         device.wait_until_it_answers()?;
         Ok(device)
     }
@@ -300,7 +367,8 @@ fn run_to_end_with(
     arguments: &[&str],
 ) -> Result<Output, QemuError> {
     require_qemu()?;
-    let mut child = qemu_command(image, flash_file)?
+    let memory = flash_file.map_or(Memory::Zero, Memory::StartsWith);
+    let mut child = qemu_command(image, &memory)?
         .args(["-monitor", "none", "-serial", "none"])
         .args(arguments)
         .args(["-semihosting-config", "enable=on,target=native"])
@@ -329,48 +397,74 @@ fn run_to_end_with(
     })
 }
 
+/// What the board's flash is.
+enum Memory<'a> {
+    /// Memory full of zeros.
+    Zero,
+    /// Memory that starts with the contents of this file, for checks that only read.
+    StartsWith(&'a Path),
+    /// This very file, of the flash's length: what the device writes is in it at once.
+    File(&'a Path),
+}
+
 /// QEMU on this board with this image, set to end with its parent; the caller adds serial line and
 /// monitor.
-fn qemu_command(image: &Path, flash_file: Option<&Path>) -> Result<Command, QemuError> {
+fn qemu_command(image: &Path, memory: &Memory<'_>) -> Result<Command, QemuError> {
     let mut command = Command::new("sh");
-    command.args([
-        "-c",
-        ENDS_WITH_PARENT,
-        "sh",
-        "qemu-system-arm",
-        "-machine",
-        "mps2-an386",
-        "-cpu",
-        "cortex-m4",
-    ]);
-    command.args(["-display", "none"]).arg("-kernel").arg(image);
-    if let Some(path) = flash_file {
-        let unreadable = |source| QemuError::Io {
-            what: format!("the flash file {}", path.display()),
-            source,
-        };
-        // Opened as well as measured, so that one that cannot be read is found out here and not by
-        // QEMU.
-        let length = std::fs::File::open(path)
-            .and_then(|file| file.metadata())
-            .map_err(unreadable)?
-            .len();
-        if length > FLASH_LENGTH as u64 {
-            return Err(QemuError::FlashTooLong {
-                path: path.to_owned(),
-                length,
-            });
-        }
-        if length > 0 {
-            // In QEMU's options a comma ends a value unless it is doubled.
-            let file = path.display().to_string().replace(',', ",,");
+    command.args(["-c", ENDS_WITH_PARENT, "sh", "qemu-system-arm"]);
+    match memory {
+        Memory::File(path) => {
+            // What QEMU takes for this board's main memory is the PSRAM that stands for the flash.
+            let file = in_option(path);
+            let size = FLASH_LENGTH;
             command.args([
-                "-device",
-                &format!("loader,file={file},addr={FLASH_START:#x},force-raw=on"),
+                "-object",
+                &format!("memory-backend-file,id=flash,size={size},mem-path={file},share=on"),
+                "-machine",
+                "mps2-an386,memory-backend=flash",
             ]);
         }
+        Memory::StartsWith(_) | Memory::Zero => {
+            command.args(["-machine", "mps2-an386"]);
+        }
+    }
+    command.args(["-cpu", "cortex-m4", "-display", "none"]);
+    command.arg("-kernel").arg(image);
+    if let Memory::StartsWith(path) = memory
+        && length_of(path)? > 0
+    {
+        let file = in_option(path);
+        command.args([
+            "-device",
+            &format!("loader,file={file},addr={FLASH_START:#x},force-raw=on"),
+        ]);
     }
     Ok(command)
+}
+
+/// In QEMU's options a comma ends a value unless it is doubled.
+fn in_option(path: &Path) -> String {
+    path.display().to_string().replace(',', ",,")
+}
+
+/// Length of the contents for a flash. The file is opened as well as measured, so that one that cannot
+/// be read is found out here and not by QEMU.
+fn length_of(path: &Path) -> Result<u64, QemuError> {
+    let unreadable = |source| QemuError::Io {
+        what: format!("the flash file {}", path.display()),
+        source,
+    };
+    let length = std::fs::File::open(path)
+        .and_then(|file| file.metadata())
+        .map_err(unreadable)?
+        .len();
+    if length > FLASH_LENGTH as u64 {
+        return Err(QemuError::FlashTooLong {
+            path: path.to_owned(),
+            length,
+        });
+    }
+    Ok(length)
 }
 
 /// Makes sure that QEMU is installed.

@@ -1,13 +1,15 @@
 //! The board's registers and memory: the one file with `unsafe` in it.
 //!
 //! It is needed for three things that the language cannot check: volatile access to device
-//! registers at fixed addresses, a view of the flash that the board maps into memory, and switching
-//! an interrupt on. Each stands in a function of its own, with the reason why it is sound.
+//! registers and flash at fixed addresses, views of the flash that the board maps into memory, and
+//! switching an interrupt on. Each stands in a function of its own, with the reason why it is sound.
 //!
 //! The board is Arm's MPS2 with the AN386 image (Arm DAI 0386): CMSDK UART 0 at 0x40004000, dual
 //! timer at 0x40002000, both clocked with 25 MHz; 16 MiB of PSRAM at 0x21000000, which here stand
 //! for memory-mapped NOR flash. QEMU emulates all of them.
 #![allow(unsafe_code)]
+
+use core::sync::atomic::{AtomicBool, Ordering};
 
 use cortex_m::interrupt::InterruptNumber;
 use cortex_m::peripheral::NVIC;
@@ -132,12 +134,36 @@ pub fn timer_ticks() -> u32 {
     !read(Register::TimerValue)
 }
 
-/// The emulated flash.
+/// The emulated flash, for an image that only reads it: one that calls [`flash_to_write`] must not
+/// call this.
 pub fn flash() -> &'static [u8] {
     // SAFETY: the board has 16 MiB of plain memory here, outside of what `memory.x` gives to the
     // program, so no other Rust object overlaps; nothing writes there while the image runs, and any
     // bytes are valid `u8`.
     unsafe { core::slice::from_raw_parts(FLASH_START as *const u8, FLASH_LENGTH) }
+}
+
+/// The emulated flash, for the image that writes it; `None` from the second call on. Whoever takes it
+/// splits it into regions, so that none can be written while it is borrowed for reading.
+pub fn flash_to_write() -> Option<&'static mut [u8]> {
+    static IS_TAKEN: AtomicBool = AtomicBool::new(false);
+    if IS_TAKEN.swap(true, Ordering::Relaxed) {
+        return None;
+    }
+    // SAFETY: as for `flash`, and nobody else has a reference to it: this one is handed out once,
+    // and the image that takes it calls `flash` nowhere.
+    Some(unsafe { core::slice::from_raw_parts_mut(FLASH_START as *mut u8, FLASH_LENGTH) })
+}
+
+/// Writes to flash, byte by byte in this order, as long as there are both a place and a byte.
+///
+/// What is in flash must be there should the power go now, so the compiler may neither put a write
+/// off nor swap two.
+pub fn write_flash(place: &mut [u8], bytes: impl Iterator<Item = u8>) {
+    for (place, byte) in place.iter_mut().zip(bytes) {
+        // SAFETY: a valid place, borrowed for writing.
+        unsafe { core::ptr::from_mut(place).write_volatile(byte) }
+    }
 }
 
 /// Called by the panic handler of an image that must not contain one: the function that it calls

@@ -2,7 +2,11 @@
 
 use core::convert::Infallible;
 
-use firmware_sim::port::{BlobStore, Clock, Link};
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_write,
+};
+use firmware_sim::port::{Clock, Link, MappedFlash, Regions};
+use firmware_sim::storage::Layout;
 
 use crate::machine;
 
@@ -46,13 +50,81 @@ impl Link for Uart {
     }
 }
 
-/// The memory-mapped flash, with the blob at its start.
-#[derive(Debug)]
-pub struct Flash;
+/// Length of an erase block, bytes.
+const BLOCK: usize = 4096;
 
-impl BlobStore for Flash {
-    fn active_blob(&self) -> &[u8] {
-        machine::flash()
+/// Length of a program unit, bytes.
+const UNIT: usize = 8;
+
+/// The regions of the flash; `None` if they were handed out before.
+pub fn flash_regions() -> Option<Regions<FlashRegion>> {
+    let layout = Layout::of(machine::FLASH_LENGTH as u32, BLOCK as u32)?;
+    let (factory, rest) = machine::flash_to_write()?.split_at_mut_checked(layout.block as usize)?;
+    let (slot_0, rest) = rest.split_at_mut_checked(layout.slot as usize)?;
+    let (slot_1, _) = rest.split_at_mut_checked(layout.slot as usize)?;
+    Some(Regions {
+        factory: FlashRegion(factory),
+        slots: [FlashRegion(slot_0), FlashRegion(slot_1)],
+    })
+}
+
+/// A part of the memory-mapped flash, with the rules of NOR flash: the board's memory would take
+/// anything.
+#[derive(Debug)]
+pub struct FlashRegion(&'static mut [u8]);
+
+impl ErrorType for FlashRegion {
+    type Error = NorFlashErrorKind;
+}
+
+impl ReadNorFlash for FlashRegion {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
+        let start = offset as usize;
+        let stored = self
+            .0
+            .get(start..start.saturating_add(bytes.len()))
+            .ok_or(NorFlashErrorKind::OutOfBounds)?;
+        for (byte, &stored) in bytes.iter_mut().zip(stored) {
+            *byte = stored;
+        }
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        self.0.len()
+    }
+}
+
+impl NorFlash for FlashRegion {
+    const WRITE_SIZE: usize = UNIT;
+    const ERASE_SIZE: usize = BLOCK;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
+        check_erase(self, from, to)?;
+        let place = self.0.get_mut(from as usize..to as usize);
+        let place = place.ok_or(NorFlashErrorKind::OutOfBounds)?;
+        machine::write_flash(place, core::iter::repeat(0xff));
+        Ok(())
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NorFlashErrorKind> {
+        check_write(self, offset, bytes.len())?;
+        let start = offset as usize;
+        let place = self.0.get_mut(start..start.saturating_add(bytes.len()));
+        let place = place.ok_or(NorFlashErrorKind::OutOfBounds)?;
+        if place.iter().any(|&byte| byte != 0xff) {
+            return Err(NorFlashErrorKind::Other);
+        }
+        machine::write_flash(place, bytes.iter().copied());
+        Ok(())
+    }
+}
+
+impl MappedFlash for FlashRegion {
+    fn mapped(&self) -> &[u8] {
+        self.0
     }
 }
 

@@ -5,20 +5,25 @@
 
 use cortex_m_rt::entry;
 use firmware_cortex_m::machine;
-use firmware_cortex_m::ports::{Flash, Timer, Uart};
+use firmware_cortex_m::ports::{Timer, Uart, flash_regions};
 use firmware_sim::app::Device;
 use firmware_sim::session::Session;
 
 #[entry]
 fn main() -> ! {
-    let flash = Flash;
-    let mut uart = Uart::start();
-    let mut device = Device::boot("firmware-sim cortex-m", &flash, Timer::start());
-    let mut session = Session::new();
+    if let Some(mut regions) = flash_regions() {
+        let mut uart = Uart::start();
+        let mut device = Device::new("firmware-sim cortex-m", Timer::start());
+        let mut session = Session::new();
+        loop {
+            // A UART never closes and never breaks, so this lasts until another blob is active.
+            let mut epoch = device.epoch(&mut regions);
+            let Ok(_) = session.serve(&mut uart, &mut epoch);
+        }
+    }
+    // Not reached: the flash has not been taken before.
     loop {
-        // A UART never closes and never breaks, so one round of this lasts as long as the device is
-        // on.
-        let Ok(()) = session.serve(&mut uart, &mut device);
+        machine::uart_wait();
     }
 }
 
