@@ -10,7 +10,7 @@ use crate::demo::device::{check_cortex_m, check_simulated, corner_pairs};
 use crate::demo::known::measure_known;
 use crate::demo::page::{Entry, page};
 use crate::demo::unseen::measure_unseen;
-use crate::demo::{DemoError, Measured, words};
+use crate::demo::{DemoError, DeviceCheck, Measured, words};
 use crate::error::{Error, UsageError};
 use crate::evaluate::Folds;
 use crate::pack::AlignedBytes;
@@ -33,7 +33,7 @@ const FORMATS: &str = "\
 For each dataset: corners are detected, the cameras calibrated, the blob packed and opened by the
 device's runtime, and points measured with it: held-out boards, each with a blob that was made
 without it; where the truth is known, matches.csv and holdout.csv against it. The simulated device
-(and the Cortex-M image in QEMU, if it has been built) must give the host's bits.
+(and the Cortex-M image in QEMU, if it has been built) is flashed and must give the host's bits.
 
 -o holds index.html, and per dataset calibration.json, rig.rays and report.html.
 Exit code 1: a verdict is fail, or a device gave other bits than the host.
@@ -43,7 +43,8 @@ fields of calibrate, and measured: unseen_boards (folds, square_mm, blob_error_p
 pairs, as_used: those that the calibration does not leave out, each with pairs,
 neighbor_rms_percent, neighbor_rms_mm, neighbor_median_percent, rigid_rms_mm, points, outside, unmet),
 known_points (file, matches, without_point, errors: points, direct_rms_mm, placed_rms_mm,
-oracle_rms_mm, direct_ratio, placed_ratio), devices (device, matches, points, different),
+oracle_rms_mm, direct_ratio, placed_ratio), devices (device, slot, self_tests: equal and all, matches, points,
+different),
 no_cortex_m (why there is no Cortex-M among the devices).";
 
 /// The datasets of the demo, folders of `data/`.
@@ -108,7 +109,7 @@ pub fn run(args: &DemoArgs, console: &Console) -> Result<Outcome, Error> {
     let _ = writeln!(words, "all of it: {}", index.display());
     let is_good = |object: &DatasetObject| {
         object.facts.verdict != Grade::Fail
-            && object.measured.devices.iter().all(|d| d.different == 0)
+            && object.measured.devices.iter().all(DeviceCheck::is_equal)
     };
     let outcome = if datasets.iter().all(is_good) {
         Outcome::Done
@@ -184,7 +185,7 @@ fn measure(
     };
     let mut devices = vec![check_simulated(&bytes, &pairs)?];
     let mut no_cortex_m = None;
-    match check_cortex_m(&bytes, rays, &pairs) {
+    match check_cortex_m(&bytes, &pairs) {
         Ok(check) => devices.push(check),
         Err(reason) => no_cortex_m = Some(reason),
     }

@@ -1,10 +1,11 @@
-//! The same matches on the host and on a device: the answers must agree to the last bit.
+//! A blob flashed to a device, and the same matches on the host and there: the answers must agree to the
+//! last bit.
 
 use super::DemoError;
 use super::known::Pair;
 use crate::device::on_wire;
 use crate::report::Calibration;
-use firmware_sim::client::{ClientError, DeviceClient};
+use firmware_sim::client::{ClientError, DeviceClient, FlashOptions};
 use firmware_sim::host::SimulatedDevice;
 use firmware_sim::protocol::{Match, Point};
 use firmware_sim::qemu::{QemuDevice, QemuError, image_path, require_qemu};
@@ -12,13 +13,16 @@ use ray_runtime::{MeasureError, PixelPoint, RayBlob};
 use serde::Serialize;
 use std::collections::HashMap;
 use std::net::{Ipv4Addr, SocketAddr};
-use std::path::Path;
 
 /// The answers of one device beside those of the host.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct DeviceCheck {
     /// What the device calls itself.
     pub device: String,
+    /// The slot of its flash that the blob went into.
+    pub slot: u8,
+    /// Self-tests of the blob that gave the host's bits there, of so many.
+    pub self_tests: [u16; 2],
     /// Matches asked.
     pub matches: usize,
     /// Matches that gave a point.
@@ -27,23 +31,31 @@ pub struct DeviceCheck {
     pub different: usize,
 }
 
+impl DeviceCheck {
+    /// Whether the device computes what the host does.
+    pub fn is_equal(&self) -> bool {
+        let [equal, tests] = self.self_tests;
+        self.different == 0 && equal == tests
+    }
+}
+
 /// Any free port, reachable from this machine alone.
 const ANY_PORT: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
 
-/// Starts the simulated device with `blob` in its flash and compares it with the host.
+/// Starts the simulated device with an empty flash, flashes `blob` to it and compares it with the host.
 ///
 /// # Errors
-/// [`DemoError`] if it cannot be started or asked.
+/// [`DemoError`] if it cannot be started, flashed or asked.
 pub fn check_simulated(blob: &[u8], pairs: &[Pair]) -> Result<DeviceCheck, DemoError> {
-    let device = SimulatedDevice::start(ANY_PORT, blob).map_err(DemoError::Start)?;
-    Ok(check(device.address(), &RayBlob::open(blob)?, pairs)?)
+    let device = SimulatedDevice::start(ANY_PORT, &[]).map_err(DemoError::Start)?;
+    Ok(check(device.address(), &RayBlob::open(blob)?, blob, pairs)?)
 }
 
 /// The same with the Cortex-M image in QEMU, if there is QEMU and the image has been built.
 ///
 /// # Errors
 /// In words, why this machine has no such device, and what to do about it.
-pub fn check_cortex_m(blob: &[u8], file: &Path, pairs: &[Pair]) -> Result<DeviceCheck, String> {
+pub fn check_cortex_m(blob: &[u8], pairs: &[Pair]) -> Result<DeviceCheck, String> {
     require_qemu().map_err(|error| error.to_string())?;
     let image = image_path("device");
     if !image.is_file() {
@@ -53,21 +65,25 @@ pub fn check_cortex_m(blob: &[u8], file: &Path, pairs: &[Pair]) -> Result<Device
         );
     }
     let stopped = |error: QemuError| error.to_string();
-    let device = QemuDevice::start(ANY_PORT, &image, Some(file)).map_err(stopped)?;
-    let blob = RayBlob::open(blob).map_err(|error| error.to_string())?;
-    check(device.address(), &blob, pairs).map_err(|error| error.to_string())
+    let device = QemuDevice::start(ANY_PORT, &image, None).map_err(stopped)?;
+    let opened = RayBlob::open(blob).map_err(|error| error.to_string())?;
+    check(device.address(), &opened, blob, pairs).map_err(|error| error.to_string())
 }
 
-/// Asks the device at `address` for every match and compares its answers with those of `blob`.
+/// Flashes a blob to the device at `address`, asks it for every match and compares its answers with
+/// those of the blob here.
 ///
 /// # Errors
 /// [`ClientError`].
 pub fn check(
     address: SocketAddr,
-    blob: &RayBlob<'_>,
+    opened: &RayBlob<'_>,
+    blob: &[u8],
     pairs: &[Pair],
 ) -> Result<DeviceCheck, ClientError> {
     let mut client = DeviceClient::connect(&format!("tcp:{address}"))?;
+    let flashed = client.flash(blob, &FlashOptions::default(), &mut |_| {})?;
+    let self_test = client.self_test()?;
     let matches: Vec<Match> = (0..)
         .zip(pairs)
         .map(|(id, [first, second])| Match {
@@ -80,10 +96,12 @@ pub fn check(
     let different = answers
         .iter()
         .zip(pairs)
-        .filter(|(answer, pair)| bits(&answer.outcome) != bits(&on_host(blob, pair)))
+        .filter(|(answer, pair)| bits(&answer.outcome) != bits(&on_host(opened, pair)))
         .count();
     Ok(DeviceCheck {
-        device: client.hello()?.device.to_string(),
+        device: client.greeting().device.to_string(),
+        slot: flashed.stored.slot,
+        self_tests: [self_test.equal, self_test.tests],
         matches: answers.len(),
         points: answers.iter().filter(|a| a.outcome.is_ok()).count(),
         different,

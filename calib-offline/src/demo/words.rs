@@ -78,8 +78,9 @@ fn of_device(check: &DeviceCheck) -> String {
         0 => "the host's bits in every answer".to_owned(),
         count => format!("{count} answers DIFFER from the host's"),
     };
+    let [equal, tests] = check.self_tests;
     format!(
-        "{}: {} matches, {} points, {verdict}",
-        check.device, check.matches, check.points
+        "{}: flashed into slot {}, {equal} of {tests} self-tests, {} matches, {} points, {verdict}",
+        check.device, check.slot, check.matches, check.points
     )
 }
