@@ -242,7 +242,10 @@ fn bytes_of_answers() {
         4, 5, 6,
         1, 1, b's', 1, 1, b'l', 0x80, 0x01, 100,
     ]);
+}
 
+#[test]
+fn bytes_of_measured_points() {
     let point = Point {
         point_mm: [1.0, 2.0, -2.0],
         gap_squared_mm2: 0.5,
