@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut blobs = Vec::new();
     for name in ["stereo-v2", "stereo-v3-small", "stereo-v3-fast"] {
         let bytes = std::fs::read(format!("{golden}/{name}.rays"))?;
-        let mut aligned = Box::new(Aligned([0; 1 << 16]));
+        let mut aligned = Box::new(Aligned([0; 1 << 14]));
         let place = aligned.0.get_mut(..bytes.len()).ok_or("a larger blob")?;
         place.copy_from_slice(&bytes);
         let blob = RayBlob::open(place).map_err(|error| format!("{name}: {error}"))?;

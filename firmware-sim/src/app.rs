@@ -15,7 +15,7 @@
 mod self_test;
 
 use heapless::Vec;
-use ray_runtime::{MeasureError, PixelPoint, RayBlob};
+use ray_runtime::{MeasureError, OpenError, PixelPoint, RayBlob};
 
 use crate::health::Health;
 use crate::port::{Clock, MappedFlash, Regions};
@@ -84,7 +84,7 @@ impl<C: Clock> Device<C> {
         let blob = match (active, stored) {
             (Some(region), Some(stored)) => blob_bytes(region, stored.length)
                 .and_then(RayBlob::open)
-                .map_err(|error| error.code()),
+                .map_err(OpenError::code),
             _ => Err(booted.open_error),
         };
         Epoch {
@@ -136,7 +136,7 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
             }
             Err(refusal) => {
                 self.note_refused(refusal);
-                Reply::Refused(self.from_start_of_flash(refusal))
+                Reply::Refused(self.counted_from_start_of_flash(refusal))
             }
         }
     }
@@ -278,7 +278,7 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
     }
 
     /// A refusal with its address as seen from outside of the slot.
-    fn from_start_of_flash(&self, refusal: Refusal) -> Refusal {
+    fn counted_from_start_of_flash(&self, refusal: Refusal) -> Refusal {
         let Refusal::FlashFailed { operation, address } = refusal else {
             return refusal;
         };

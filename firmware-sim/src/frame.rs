@@ -41,12 +41,14 @@ pub fn checksum(bytes: &[u8]) -> u32 {
 /// The same, piece by piece.
 pub struct RunningChecksum(crc::Digest<'static, u32>);
 
-impl RunningChecksum {
+impl Default for RunningChecksum {
     /// Of no bytes yet.
-    pub fn new() -> Self {
+    fn default() -> Self {
         Self(CHECKSUM.digest())
     }
+}
 
+impl RunningChecksum {
     /// Takes more bytes in.
     pub fn add(&mut self, bytes: &[u8]) {
         self.0.update(bytes);

@@ -79,7 +79,7 @@ impl SimulatedDevice {
 enum Ask {
     Request {
         peer: Peer,
-        request: Request,
+        request: Box<Request>,
         answer: Sender<Reply>,
     },
     NoteRefused(Refusal),
@@ -180,7 +180,7 @@ impl Responder for Shared {
     fn respond(&mut self, request: &Request) -> Reply {
         let ask = Ask::Request {
             peer: self.peer,
-            request: request.clone(),
+            request: Box::new(request.clone()),
             answer: self.answer.clone(),
         };
         let asked = self.asks.send(ask).ok();

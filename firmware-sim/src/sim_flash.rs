@@ -8,7 +8,8 @@
 //!   its bits changed ([`Cut::Torn`]), or with bits that read differently each time ([`Cut::Weak`]).
 //! - Blocks can fail to be erased, units to be programmed, and bits can flip at rest.
 //!
-//! The driver's reads of a weak bit differ each time. The mapping shows one value of it from one
+//! The driver's reads of weak bits differ each time: sometimes all of a unit read as if the operation
+//! had not begun, sometimes as if it had ended, often each as it happens. The mapping shows one value of it from one
 //! power-up to the next: a blob in place cannot change under its reader, and the storage never puts
 //! a blob in use on such bits.
 
@@ -98,10 +99,30 @@ struct Chip {
     operations: u64,
     wear: Vec<u32>,
     /// Bits that read differently each time, by unit.
-    weak: BTreeMap<usize, u64>,
+    weak: BTreeMap<usize, Weak>,
     broken_blocks: BTreeSet<usize>,
     broken_units: BTreeSet<usize>,
     file: Option<File>,
+}
+
+/// A unit that reads differently each time.
+#[derive(Clone, Copy, Debug, Default)]
+struct Weak {
+    /// What stood there before.
+    before: u64,
+    /// The bits that waver.
+    mask: u64,
+}
+
+impl Weak {
+    fn read(self, random: &mut SplitMix) -> u64 {
+        let changed = match random.next() % 4 {
+            0 => 0,
+            1 => u64::MAX,
+            _ => random.next(),
+        };
+        self.before ^ (changed & self.mask)
+    }
 }
 
 /// What becomes of an operation.
@@ -184,9 +205,9 @@ impl SimFlash {
         chip.has_power = true;
         chip.cut = None;
         chip.operations = 0;
-        for (&unit, &mask) in &chip.weak {
+        for (&unit, weak) in &chip.weak {
             if let Some(word) = self.words.get_mut(unit) {
-                *word ^= chip.random.next() & mask;
+                *word = weak.read(&mut chip.random);
             }
         }
     }
@@ -280,10 +301,15 @@ impl ReadNorFlash for SimRegion<'_> {
         if chip.weak.is_empty() {
             return Ok(());
         }
-        for (address, byte) in (self.start + start..).zip(bytes) {
-            if let Some(&mask) = chip.weak.get(&(address / UNIT)) {
-                let mask = mask.to_le_bytes()[address % UNIT];
-                *byte ^= chip.random.next() as u8 & mask;
+        let from = self.start + start;
+        let units = from / UNIT..=(from + bytes.len()) / UNIT;
+        let weak: Vec<(usize, Weak)> = chip.weak.range(units).map(|(&u, &w)| (u, w)).collect();
+        for (unit, weak) in weak {
+            let read = weak.read(&mut chip.random).to_le_bytes();
+            for (address, byte) in (unit * UNIT..).zip(read) {
+                if let Some(place) = address.checked_sub(from).and_then(|at| bytes.get_mut(at)) {
+                    *place = byte;
+                }
             }
         }
         Ok(())
@@ -353,6 +379,7 @@ impl SimRegion<'_> {
         chip.forget_weak(address, done);
         if let Power::Lost { cut, .. } = power {
             chip.spoil(address + done, &mut place[done..], &bytes[done..], cut);
+            chip.note_before(address, place);
         }
         chip.write_through(address, place)?;
         match power {
@@ -388,19 +415,30 @@ impl Chip {
         }
     }
 
-    /// What is left of the bytes that an operation did not reach.
+    /// What is left of the bytes that an operation did not reach: `place`, which starts at `address`.
     fn spoil(&mut self, address: usize, place: &mut [u8], wanted: &[u8], cut: Cut) {
         for (address, (byte, &wanted)) in (address..).zip(place.iter_mut().zip(wanted)) {
             let changing = *byte ^ wanted;
             match cut {
                 Cut::Clean => {}
                 Cut::Torn => *byte ^= self.random.next() as u8 & changing,
-                Cut::Weak => {
-                    let mask = u64::from(changing) << (8 * (address % UNIT));
-                    if mask != 0 {
-                        *self.weak.entry(address / UNIT).or_insert(0) |= mask;
-                    }
+                Cut::Weak if changing != 0 => {
+                    let shift = 8 * (address % UNIT);
+                    self.weak.entry(address / UNIT).or_default().mask |=
+                        u64::from(changing) << shift;
                 }
+                Cut::Weak => {}
+            }
+        }
+    }
+
+    /// Notes what the weak units of a region read as before their bits began to waver.
+    fn note_before(&mut self, start: usize, region: &[u8]) {
+        let units = start / UNIT..(start + region.len()) / UNIT;
+        for (&unit, weak) in self.weak.range_mut(units) {
+            let at = unit * UNIT - start;
+            if let Some(bytes) = region.get(at..).and_then(|rest| rest.first_chunk()) {
+                weak.before = u64::from_le_bytes(*bytes);
             }
         }
     }

@@ -183,6 +183,9 @@ fn inspect<R: MappedFlash>(index: u8, slot: &R, record: Option<Record>) -> SlotS
 }
 
 /// The blob of a record, opened in place after a look at all of it.
+///
+/// # Errors
+/// Any [`OpenError`], among them the checksum of the record that is not that of the bytes.
 pub fn blob_of<R: MappedFlash>(slot: &R, record: Record) -> Result<RayBlob<'_>, OpenError> {
     let bytes = blob_bytes(slot, record.length)?;
     let blob = RayBlob::open(bytes)?;
@@ -197,6 +200,9 @@ pub fn blob_of<R: MappedFlash>(slot: &R, record: Record) -> Result<RayBlob<'_>, 
 }
 
 /// The first bytes behind the log.
+///
+/// # Errors
+/// [`OpenError::Truncated`] if the slot is shorter.
 pub fn blob_bytes<R: MappedFlash>(slot: &R, length: u32) -> Result<&[u8], OpenError> {
     let start = R::ERASE_SIZE;
     slot.mapped()

@@ -102,11 +102,12 @@ impl DeviceClient {
         let mut is_connected = true;
         loop {
             let best = progress.stored;
-            let outcome = match is_connected {
-                true => Ok(()),
-                false => self.reconnect(),
-            }
-            .and_then(|()| {
+            let connected = if is_connected {
+                Ok(())
+            } else {
+                self.reconnect()
+            };
+            let outcome = connected.and_then(|()| {
                 is_connected = true;
                 self.transfer(new, blob, &mut progress, on_progress)
             });

@@ -260,7 +260,10 @@ fn bytes_of_answers() {
         1, 3, 0, 0, 0x80, 0xbf, 0, 0, 0, 0x40, 0, 0, 0x80, 0x40,
         1, 2, 0, 0, 0, 0x3f, 0, 0, 0x80, 0xbf, 0, 0, 0x80, 0x3f,
     ]);
+}
 
+#[test]
+fn bytes_of_measured_points() {
     let point = Point {
         point_mm: [1.0, 2.0, -2.0],
         gap_squared_mm2: 0.5,

@@ -129,5 +129,5 @@ fn broken_places_fail_until_repaired() {
 #[test]
 fn too_few_blocks_or_half_a_block_are_no_flash() {
     assert!(SimFlash::blank(4, 0).is_none());
-    assert!(SimFlash::with_contents(&[0; 5 * BLOCK + 1], 0).is_none());
+    assert!(SimFlash::with_contents(&vec![0; 5 * BLOCK + 1], 0).is_none());
 }

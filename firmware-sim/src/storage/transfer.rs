@@ -242,7 +242,7 @@ impl Checked {
 
 /// The checksum of the blob as the driver reads it.
 fn stored_checksum<R: NorFlash>(slot: &mut R, length: u32) -> Result<u32, Refusal> {
-    let mut sum = crate::frame::RunningChecksum::new();
+    let mut sum = crate::frame::RunningChecksum::default();
     let mut piece = [0; 256];
     let mut at = 0;
     while at < length {

@@ -14,7 +14,7 @@ pub struct Running {
     pub process: Child,
     /// Where the device listens.
     pub address: String,
-    _blob: Option<NamedTempFile>,
+    blob: Option<NamedTempFile>,
 }
 
 impl Running {
@@ -23,7 +23,7 @@ impl Running {
         let mut file = NamedTempFile::new().unwrap();
         file.write_all(blob).unwrap();
         let mut running = Self::keeping(kind, file.path(), &[]);
-        running._blob = Some(file);
+        running.blob = Some(file);
         running
     }
 
@@ -54,7 +54,7 @@ impl Running {
         Self {
             address: address.trim_end().to_owned(),
             process,
-            _blob: None,
+            blob: None,
         }
     }
 
