@@ -25,7 +25,8 @@ use crate::protocol::{
 };
 use crate::session::Responder;
 use crate::storage::log::{Log, Record};
-use crate::storage::transfer::{Peer, Transfer};
+use crate::storage::transfer::{Owner, Peer, Transfer};
+use crate::storage::trust::Trust;
 use crate::storage::{self, blob_bytes, blob_of, max_blob, rig};
 
 /// Version of the application, as [`Hello`] gives it.
@@ -36,6 +37,7 @@ pub const FIRMWARE_VERSION: &str = env!("CARGO_PKG_VERSION");
 pub struct Device<C> {
     kind: &'static str,
     clock: C,
+    trust: Trust,
     transfer: Option<Transfer>,
     /// Of what this epoch's blob measured.
     health: Health,
@@ -51,6 +53,7 @@ impl<C: Clock> Device<C> {
         Self {
             kind,
             clock,
+            trust: Trust::Anybody,
             transfer: None,
             health: Health::new(),
             answered: 0,
@@ -58,6 +61,13 @@ impl<C: Clock> Device<C> {
             updates: 0,
             rollbacks: 0,
         }
+    }
+
+    /// The same device, taking only blobs that this trust allows. What is in its slots stays there.
+    #[must_use]
+    pub fn taking(mut self, trust: Trust) -> Self {
+        self.trust = trust;
+        self
     }
 
     /// Decides which blob is active, checks all of it and opens it in place.
@@ -148,6 +158,7 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
             max_matches: MAX_MATCHES as u8,
             max_chunk: MAX_CHUNK as u16,
             max_blob: max_blob(self.inactive),
+            needs_signature: self.device.trust.needs_signature(),
         }
     }
 
@@ -201,7 +212,11 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
         {
             return Ok(Reply::Active(active));
         }
-        let begun = Transfer::begin(self.inactive, new, peer, self.rig.as_ref(), now_ms);
+        let owner = Owner {
+            rig: self.rig.as_ref(),
+            trust: self.device.trust,
+        };
+        let begun = Transfer::begin(self.inactive, new, peer, &owner, now_ms);
         if matches!(begun, Ok(_) | Err(Refusal::FlashFailed { .. }))
             && let Some(slot) = self.slots.get_mut(self.inactive_index)
         {
@@ -227,7 +242,11 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
         let transfer = self.device.transfer.as_ref().ok_or(Refusal::NoUpdate)?;
         transfer.check_peer(peer)?;
         let identity = transfer.status().identity;
-        let outcome = transfer.check(self.inactive, self.rig.as_ref());
+        let owner = Owner {
+            rig: self.rig.as_ref(),
+            trust: self.device.trust,
+        };
+        let outcome = transfer.check(self.inactive, &owner);
         if let Err(refusal @ Refusal::Incomplete { .. }) = outcome {
             return Err(refusal);
         }

@@ -18,6 +18,7 @@ use crate::protocol::{Refusal, Reply, Request};
 use crate::session::{Paused, Responder, Session};
 use crate::sim_flash::SimFlash;
 use crate::storage::transfer::Peer;
+use crate::storage::trust::Trust;
 
 pub use crate::flash_file::FLASH_LENGTH;
 
@@ -51,12 +52,24 @@ impl SimulatedDevice {
     /// # Errors
     /// If the address cannot be listened on.
     pub fn start_with(listen: SocketAddr, flash: SimFlash) -> std::io::Result<Self> {
+        Self::start_trusting(listen, flash, Trust::Anybody)
+    }
+
+    /// The same, taking only blobs that this trust allows.
+    ///
+    /// # Errors
+    /// If the address cannot be listened on.
+    pub fn start_trusting(
+        listen: SocketAddr,
+        flash: SimFlash,
+        trust: Trust,
+    ) -> std::io::Result<Self> {
         let listener = TcpListener::bind(listen)?;
         let address = listener.local_addr()?;
         let (asks, asked) = mpsc::channel();
         thread::Builder::new()
             .name("device".into())
-            .spawn(move || run(flash, &asked))?;
+            .spawn(move || run(flash, trust, &asked))?;
         let server = thread::Builder::new()
             .name("listener".into())
             .spawn(move || accept(&listener, &asks))?;
@@ -86,8 +99,8 @@ enum Ask {
 }
 
 /// The device, until nobody can ask it any more.
-fn run(mut flash: SimFlash, asked: &Receiver<Ask>) {
-    let mut device = Device::new("firmware-sim host", HostClock(Instant::now()));
+fn run(mut flash: SimFlash, trust: Trust, asked: &Receiver<Ask>) {
+    let mut device = Device::new("firmware-sim host", HostClock(Instant::now())).taking(trust);
     let mut regions = flash.regions();
     loop {
         let mut epoch = device.epoch(&mut regions);

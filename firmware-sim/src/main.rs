@@ -12,6 +12,7 @@ use firmware_sim::flash_file::{self, FlashFile};
 use firmware_sim::host::SimulatedDevice;
 use firmware_sim::protocol::{CameraStatus, MAX_CAMERAS_LISTED, MAX_NAME, Rig, name};
 use firmware_sim::qemu::{self, QemuDevice};
+use firmware_sim::storage::trust::{PublicKey, Trust};
 
 /// A measuring device, simulated.
 ///
@@ -66,6 +67,9 @@ struct DeviceArguments {
     /// order. Such a device refuses blobs for other cameras.
     #[arg(long = "camera", value_name = "NAME=WIDTHxHEIGHT", value_parser = camera)]
     cameras: Vec<CameraStatus>,
+    /// Take only blobs signed by the owner of this Ed25519 key; in QEMU, the image is built for it.
+    #[arg(long, value_name = "64 HEX DIGITS", value_parser = public_key)]
+    public_key: Option<PublicKey>,
     /// Serial number of a new device's rig.
     #[arg(long, value_name = "TEXT", requires = "cameras")]
     serial: Option<String>,
@@ -98,6 +102,11 @@ impl DeviceArguments {
         }
         Ok(file)
     }
+}
+
+fn public_key(text: &str) -> Result<PublicKey, String> {
+    PublicKey::from_hex(text)
+        .ok_or_else(|| "give the key's 32 bytes as 64 hexadecimal digits".to_owned())
 }
 
 fn camera(text: &str) -> Result<CameraStatus, String> {
@@ -162,7 +171,8 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
 fn run_on_host(arguments: &DeviceArguments) -> anyhow::Result<()> {
     let FlashFile { flash, kept_in } = arguments.flash()?;
-    let device = SimulatedDevice::start_with(arguments.listen, flash)
+    let trust = arguments.public_key.map_or(Trust::Anybody, Trust::Signed);
+    let device = SimulatedDevice::start_trusting(arguments.listen, flash, trust)
         .with_context(|| format!("the device on {}", arguments.listen))?;
     announce(device.address())?;
     device.serve_forever();
@@ -178,7 +188,10 @@ fn run_in_qemu(arguments: &DeviceArguments, image: Option<&Path>) -> anyhow::Res
         path.to_owned()
     } else {
         eprintln!("firmware-sim: building the image, unless it is up to date");
-        qemu::build_image("device")?
+        match &arguments.public_key {
+            Some(key) => qemu::build_signed_image("device_signed", &key.to_hex())?,
+            None => qemu::build_image("device")?,
+        }
     };
     let device = QemuDevice::start_with(arguments.listen, &image, flash)?;
     announce(device.address())?;

@@ -115,6 +115,28 @@ pub struct NewBlob {
     /// Serial number of the rig it was calibrated on, if known: a device that knows its own takes
     /// no other.
     pub rig_serial: Option<Name>,
+    /// Who made it, if anybody signed it: [`Hello::needs_signature`] says whether it must be.
+    pub signature: Option<Signature>,
+}
+
+/// An Ed25519 signature (RFC 8032) of all bytes of a blob.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Signature {
+    /// Its first half, a point.
+    pub r: [u8; 32],
+    /// Its second half, a number.
+    pub s: [u8; 32],
+}
+
+impl Signature {
+    /// From its 64 bytes.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let (r, s) = bytes.split_first_chunk()?;
+        Some(Self {
+            r: *r,
+            s: s.try_into().ok()?,
+        })
+    }
 }
 
 /// A piece of a blob on its way.
@@ -238,6 +260,8 @@ pub struct Hello {
     pub max_chunk: u16,
     /// Longest blob that a slot of its flash holds, bytes.
     pub max_blob: u32,
+    /// Whether it takes signed blobs only.
+    pub needs_signature: bool,
 }
 
 /// How the device is.

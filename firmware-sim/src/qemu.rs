@@ -281,7 +281,7 @@ pub fn build_image(image: &str) -> Result<PathBuf, QemuError> {
 /// # Errors
 /// As [`build_image`].
 pub fn build_soft_float_image(image: &str) -> Result<PathBuf, QemuError> {
-    build(&[image], &["--target", SOFT_FLOAT_TARGET])?;
+    build(&[image], &["--target", SOFT_FLOAT_TARGET], &[])?;
     Ok(image_of(SOFT_FLOAT_TARGET, image))
 }
 
@@ -290,10 +290,25 @@ pub fn build_soft_float_image(image: &str) -> Result<PathBuf, QemuError> {
 /// # Errors
 /// As [`build_image`].
 pub fn build_images(images: &[&str]) -> Result<(), QemuError> {
-    build(images, &[])
+    build(images, &[], &[])
 }
 
-fn build(images: &[&str], target: &[&str]) -> Result<(), QemuError> {
+/// Builds the image of this name for the owner of a key, 64 hexadecimal digits: its device takes no
+/// blobs but those signed with it.
+///
+/// # Errors
+/// As [`build_image`].
+pub fn build_signed_image(image: &str, public_key: &str) -> Result<PathBuf, QemuError> {
+    let key = ("RAYS_PUBLIC_KEY", public_key);
+    build(&[image], &["--features", "signed"], &[key])?;
+    Ok(image_path(image))
+}
+
+fn build(
+    images: &[&str],
+    arguments: &[&str],
+    environment: &[(&str, &str)],
+) -> Result<(), QemuError> {
     let root = root();
     let script = root.join("scripts/embedded-cargo.sh");
     if !script.is_file() {
@@ -303,7 +318,8 @@ fn build(images: &[&str], target: &[&str]) -> Result<(), QemuError> {
     }
     let status = Command::new(&script)
         .args(["build", "--quiet", "--locked", "--release"])
-        .args(target)
+        .args(arguments)
+        .envs(environment.iter().copied())
         .args(images.iter().flat_map(|image| ["--bin", image]))
         .stdin(Stdio::null())
         .stdout(std::io::stderr())

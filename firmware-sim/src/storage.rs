@@ -20,6 +20,7 @@
 pub mod log;
 pub mod rig;
 pub mod transfer;
+pub mod trust;
 
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 use ray_runtime::{OpenError, RayBlob};

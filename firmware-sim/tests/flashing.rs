@@ -37,6 +37,7 @@ fn announced(blob: &[u8], identity: [u8; IDENTITY_LENGTH]) -> NewBlob {
         checksum: checksum(blob),
         identity,
         rig_serial: None,
+        signature: None,
     }
 }
 

@@ -59,6 +59,7 @@ fn update(blob: &[u8], identity: [u8; 16]) -> Vec<Request> {
         checksum: checksum(blob),
         identity,
         rig_serial: None,
+        signature: None,
     })];
     for (offset, bytes) in (0..).step_by(MAX_CHUNK).zip(blob.chunks(MAX_CHUNK)) {
         let bytes = heapless::Vec::from_slice(bytes).unwrap();

@@ -5,10 +5,11 @@ use super::output::Console;
 use super::rig_file::{RigFile, open};
 use crate::dataset::identity::hex;
 use crate::device::{DeviceError, connect};
-use crate::error::{Error, UsageError};
+use crate::error::{BlobError, Error, UsageError};
 use crate::progress::Progress;
 use clap::Args;
 use firmware_sim::client::{FlashOptions, FlashProgress};
+use firmware_sim::protocol::Signature;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -24,8 +25,10 @@ cameras with its own; only then it is in use, at once and after every restart. W
 off, the blob before stays in use; `calib-offline device rollback` brings it back later, too. A link that
 breaks is opened again, and the transfer goes on where it stopped.
 
-A device that knows its cameras refuses the blob of another rig; one that knows its serial number
-takes only blobs that are flashed with it (--rig-serial).
+A device that knows its cameras refuses the blob of another rig, and one that knows its serial number
+that of another --rig-serial. A device built for the owner of a key takes only blobs with a signature by it:
+64 bytes, Ed25519, as OpenSSL 3 writes them:
+  openssl pkeyutl -sign -inkey key.pem -rawin -in rig.rays -out rig.rays.sig
 
 With --json: schema calib-offline/flash/1, rig, device, slot, sequence, bytes, identity,
 was_active (true: the device had it in use already and nothing was sent), resumed (how often a broken
@@ -44,6 +47,9 @@ pub struct FlashArgs {
     /// The serial number of the rig that was calibrated
     #[arg(long, value_name = "SERIAL")]
     pub rig_serial: Option<String>,
+    /// The blob's signature, for a device that takes signed blobs only
+    #[arg(long, value_name = "FILE")]
+    pub signature: Option<PathBuf>,
     /// How long an answer may take, s: the device erases and checks meanwhile
     #[arg(long, value_name = "SECONDS", default_value_t = 20, value_parser = clap::value_parser!(u16).range(1..=600))]
     pub timeout: u16,
@@ -83,6 +89,7 @@ pub fn run(args: &FlashArgs, console: &Console) -> Result<Outcome, Error> {
         retries: args.retries,
         timeout,
         rig_serial: args.rig_serial.clone(),
+        signature: args.signature.as_deref().map(read_signature).transpose()?,
     };
     let mut client = connect(&args.device, timeout)?;
     let mut shown = Shown::new(console.progress());
@@ -102,6 +109,20 @@ pub fn run(args: &FlashArgs, console: &Console) -> Result<Outcome, Error> {
     };
     console.result(&in_words(&object), &object);
     Ok(Outcome::Done)
+}
+
+fn read_signature(file: &Path) -> Result<Signature, Error> {
+    let bytes = std::fs::read(file).map_err(|source| BlobError::Read {
+        file: file.to_owned(),
+        source,
+    })?;
+    let signature = Signature::from_bytes(&bytes);
+    signature.ok_or_else(|| {
+        Error::Usage(UsageError::UnknownKind {
+            path: file.to_owned(),
+            expected: "an Ed25519 signature: 64 bytes",
+        })
+    })
 }
 
 /// Shows what the device has stored, in kilobytes.

@@ -177,6 +177,7 @@ fn new_blob(length: u32, checksum: u32) -> NewBlob {
         checksum,
         identity: [0; 16],
         rig_serial: None,
+        signature: None,
     }
 }
 
@@ -292,6 +293,7 @@ fn what_cannot_fit_or_is_for_another_rig_is_refused_before_anything_is_erased() 
     let mut begin = |length, serial: Option<&str>| {
         let new = NewBlob {
             rig_serial: serial.map(name),
+            signature: None,
             ..new_blob(length, 1)
         };
         device.respond_to(0, &Request::BeginUpdate(new))
@@ -320,6 +322,7 @@ fn what_cannot_fit_or_is_for_another_rig_is_refused_before_anything_is_erased() 
     let mut device = device.epoch(&mut regions);
     let new = NewBlob {
         rig_serial: Some(name("17")),
+        signature: None,
         ..new_blob(limit, 1)
     };
     let begun = device.respond_to(0, &Request::BeginUpdate(new));

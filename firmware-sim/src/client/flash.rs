@@ -8,8 +8,8 @@ use ray_runtime::{OpenError, RayBlob};
 use super::{ClientError, DeviceClient, unexpected};
 use crate::frame::checksum;
 use crate::protocol::{
-    CHUNK_UNIT, Chunk, IDENTITY_LENGTH, MAX_CHUNK, NewBlob, Refusal, Reply, Request, StoredBlob,
-    name,
+    CHUNK_UNIT, Chunk, IDENTITY_LENGTH, MAX_CHUNK, NewBlob, Refusal, Reply, Request, Signature,
+    StoredBlob, name,
 };
 
 /// How patiently a blob is sent.
@@ -21,6 +21,8 @@ pub struct FlashOptions {
     pub timeout: Duration,
     /// Serial number of the rig that the blob was calibrated on, if known.
     pub rig_serial: Option<String>,
+    /// Who made the blob, for a device that takes signed ones only.
+    pub signature: Option<Signature>,
 }
 
 impl Default for FlashOptions {
@@ -29,6 +31,7 @@ impl Default for FlashOptions {
             retries: 5,
             timeout: Duration::from_secs(20),
             rig_serial: None,
+            signature: None,
         }
     }
 }
@@ -79,6 +82,7 @@ impl DeviceClient {
             checksum: checksum(blob),
             identity: identity_of(blob).map_err(ClientError::NotABlob)?,
             rig_serial: options.rig_serial.as_deref().map(name),
+            signature: options.signature,
         };
         let usual_timeout = std::mem::replace(&mut self.timeout, options.timeout);
         let outcome = self.flash_patiently(&new, blob, options.retries, on_progress);

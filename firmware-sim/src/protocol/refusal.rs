@@ -92,6 +92,10 @@ pub enum Refusal {
         /// It is given up unless it goes on within this time, ms.
         wait_ms: u32,
     },
+    /// The device takes signed blobs only.
+    NotSigned,
+    /// The signature is not that of the device's key over these bytes.
+    BadSignature,
 }
 
 /// What of a camera, or of the rig, is not the device's.
@@ -210,6 +214,14 @@ impl core::fmt::Display for Refusal {
                 out,
                 "somebody else is updating it: try again in {} s",
                 wait_ms.div_ceil(1000)
+            ),
+            Self::NotSigned => write!(
+                out,
+                "it takes signed blobs only: have it signed with the key that the device was built for, and give --signature"
+            ),
+            Self::BadSignature => write!(
+                out,
+                "the signature is not of this blob, or not by the key that the device was built for: nothing was taken"
             ),
         }
     }

@@ -8,7 +8,8 @@ use serde::de::DeserializeOwned;
 use super::{
     BlobStatus, CameraStatus, Chunk, FlashOperation, Hello, MAX_CAMERAS_LISTED, MAX_CHUNK,
     MAX_MATCHES, MAX_NAME, Match, Measured, Name, NewBlob, Point, Refusal, Reply, Request, Rig,
-    RigPart, SelfTestReport, Sighting, SlotState, Status, StoredBlob, UpdateStatus, name,
+    RigPart, SelfTestReport, Sighting, Signature, SlotState, Status, StoredBlob, UpdateStatus,
+    name,
 };
 use crate::frame::{FrameWriter, MAX_MESSAGE};
 use crate::health::{GapReport, Predicted};
@@ -63,12 +64,13 @@ fn bytes_of_an_update() {
         checksum: 1,
         identity: [9; 16],
         rig_serial: Some(name("s")),
+        signature: None,
     };
     #[rustfmt::skip]
     assert_bytes(&Request::BeginUpdate(new), &[
         3, 0xc8, 0x01, 1,
         9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9,
-        1, 1, b's',
+        1, 1, b's', 0,
     ]);
     let chunk = Chunk {
         offset: 128,
@@ -188,10 +190,11 @@ fn bytes_of_answers() {
         max_matches: 28,
         max_chunk: 896,
         max_blob: 5,
+        needs_signature: true,
     };
     assert_bytes(
         &Reply::Hello(hello),
-        &[1, 2, b'a', b'b', 3, b'0', b'.', b'1', 28, 0x80, 0x07, 5],
+        &[1, 2, b'a', b'b', 3, b'0', b'.', b'1', 28, 0x80, 0x07, 5, 1],
     );
 
     let without = Status {
@@ -369,6 +372,7 @@ fn the_longest_messages_fit_a_frame() {
         max_matches: u8::MAX,
         max_chunk: u16::MAX,
         max_blob: u32::MAX,
+        needs_signature: true,
     };
     let refusal = Refusal::WrongVersion {
         found: u8::MAX,
@@ -388,6 +392,10 @@ fn the_longest_messages_fit_a_frame() {
         checksum: u32::MAX,
         identity: [0xff; 16],
         rig_serial: Some(name(&"n".repeat(MAX_NAME))),
+        signature: Some(Signature {
+            r: [0xff; 32],
+            s: [0xff; 32],
+        }),
     });
     assert!(writer.seal(u16::MAX, &begin).is_some());
     for reply in [

@@ -5,6 +5,7 @@ use ray_runtime::OpenError;
 use ray_runtime::format::HEADER_LEN;
 
 use super::log::{Log, Record, erase_block};
+use super::trust::Trust;
 use super::{UNIT, blob_bytes, blob_of, max_blob, program, rig};
 use crate::port::MappedFlash;
 use crate::protocol::{Chunk, FlashOperation, NewBlob, Refusal, Rig, RigPart, UpdateStatus};
@@ -14,6 +15,15 @@ pub type Peer = u32;
 
 /// A transfer that its peer has left alone for so long may be given up for another peer's, ms.
 pub const SILENCE_MS: u64 = 5000;
+
+/// Whose device it is.
+#[derive(Clone, Copy, Debug)]
+pub struct Owner<'a> {
+    /// Its own cameras, if it knows them.
+    pub rig: Option<&'a Rig>,
+    /// Whose blobs it takes.
+    pub trust: Trust,
+}
 
 /// A blob under way.
 #[derive(Clone, Debug)]
@@ -40,12 +50,13 @@ impl Transfer {
     /// counts any more.
     ///
     /// # Errors
-    /// [`Refusal::TooLong`], [`Refusal::NotABlob`], [`Refusal::OtherRig`], [`Refusal::FlashFailed`].
+    /// [`Refusal::TooLong`], [`Refusal::NotABlob`], [`Refusal::OtherRig`], [`Refusal::NotSigned`],
+    /// [`Refusal::FlashFailed`].
     pub fn begin<R: NorFlash>(
         slot: &mut R,
         new: &NewBlob,
         peer: Peer,
-        own_rig: Option<&Rig>,
+        owner: &Owner<'_>,
         now_ms: u64,
     ) -> Result<Self, Refusal> {
         let limit = max_blob(slot);
@@ -61,7 +72,7 @@ impl Transfer {
                 open_error: truncated.code(),
             });
         }
-        if let (Some(serial), Some(own)) = (&new.rig_serial, own_rig)
+        if let (Some(serial), Some(own)) = (&new.rig_serial, owner.rig)
             && *serial != own.serial
         {
             return Err(Refusal::OtherRig {
@@ -70,6 +81,9 @@ impl Transfer {
                 expected: 0,
                 found: 0,
             });
+        }
+        if owner.trust.needs_signature() && new.signature.is_none() {
+            return Err(Refusal::NotSigned);
         }
         erase_block(slot, 0)?;
         Ok(Self {
@@ -181,14 +195,15 @@ impl Transfer {
     }
 
     /// Checks all that was stored: read back through the driver, then opened in place with every
-    /// check of the runtime, then compared with what was announced and with the device's cameras.
+    /// check of the runtime, then compared with what was announced and with the device's cameras, and
+    /// its signature verified where one is asked for.
     ///
     /// # Errors
     /// [`Refusal::Incomplete`], after which the transfer can go on; otherwise why it cannot be taken.
     pub fn check<R: MappedFlash>(
         &self,
         slot: &mut R,
-        own_rig: Option<&Rig>,
+        owner: &Owner<'_>,
     ) -> Result<Checked, Refusal> {
         if self.received < self.new.length {
             return Err(Refusal::Incomplete {
@@ -213,9 +228,11 @@ impl Transfer {
         if *blob.identity() != self.new.identity {
             return Err(Refusal::OtherIdentity);
         }
-        if let Some(own) = own_rig {
+        if let Some(own) = owner.rig {
             rig::compare(&blob, own)?;
         }
+        let bytes = blob_bytes(slot, self.new.length).unwrap_or_default();
+        owner.trust.check(bytes, self.new.signature.as_ref())?;
         Ok(Checked {
             length: self.new.length,
             checksum: stored,

@@ -1,0 +1,26 @@
+//! The application of `firmware-sim` behind the board's UART.
+
+use firmware_sim::app::Device;
+use firmware_sim::session::Session;
+use firmware_sim::storage::trust::Trust;
+
+use crate::machine;
+use crate::ports::{Timer, Uart, flash_regions};
+
+/// Serves for as long as there is power.
+pub fn run(trust: Trust) -> ! {
+    if let Some(mut regions) = flash_regions() {
+        let mut uart = Uart::start();
+        let mut device = Device::new("firmware-sim cortex-m", Timer::start()).taking(trust);
+        let mut session = Session::new();
+        loop {
+            // A UART never closes and never breaks, so this lasts until another blob is active.
+            let mut epoch = device.epoch(&mut regions);
+            let Ok(_) = session.serve(&mut uart, &mut epoch);
+        }
+    }
+    // Not reached: the flash has not been taken before.
+    loop {
+        machine::uart_wait();
+    }
+}
