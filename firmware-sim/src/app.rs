@@ -59,6 +59,7 @@ impl<C: Clock> Device<C> {
     /// Decides which blob is active, checks all of it and opens it in place.
     ///
     /// Flash without a blob that can be used does not stop it: it answers, and says what is wrong.
+    #[inline(never)]
     pub fn epoch<'e, R: MappedFlash>(&'e mut self, regions: &'e mut Regions<R>) -> Epoch<'e, R, C> {
         let booted = storage::boot(regions);
         let rig = rig::read(&regions.factory);
@@ -78,7 +79,7 @@ impl<C: Clock> Device<C> {
         });
         let blob = match (active, stored) {
             (Some(region), Some(stored)) => blob_bytes(region, stored.length)
-                .and_then(RayBlob::open)
+                .and_then(storage::open)
                 .map_err(OpenError::code),
             _ => Err(booted.open_error),
         };
@@ -146,6 +147,7 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
         }
     }
 
+    #[inline(never)]
     fn status(&mut self) -> Status {
         let mut slots = self.slots;
         let update = self.device.transfer.as_ref().map(Transfer::status);
@@ -173,6 +175,7 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
             .map_err(|&open_error| Refusal::NoBlob { open_error })
     }
 
+    #[inline(never)]
     fn measure(&self, matches: &[Match]) -> Result<Reply, Refusal> {
         let blob = self.blob()?;
         let measured = matches.iter().map(|asked| measure_one(blob, asked));
@@ -183,6 +186,7 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
         Ok(Reply::SelfTested(self_test::report(self.blob()?)))
     }
 
+    #[inline(never)]
     fn begin_update(&mut self, peer: Peer, new: &NewBlob) -> Result<Reply, Refusal> {
         let now_ms = self.device.clock.uptime_ms();
         if let Some(transfer) = &mut self.device.transfer {
@@ -210,6 +214,7 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
         Ok(Reply::Receiving { received: 0 })
     }
 
+    #[inline(never)]
     fn store(&mut self, peer: Peer, chunk: &Chunk) -> Result<Reply, Refusal> {
         let now_ms = self.device.clock.uptime_ms();
         let transfer = self.device.transfer.as_mut().ok_or(Refusal::NoUpdate)?;
@@ -222,6 +227,7 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
         Ok(Reply::Receiving { received: outcome? })
     }
 
+    #[inline(never)]
     fn finish_update(&mut self, peer: Peer) -> Result<Reply, Refusal> {
         let transfer = self.device.transfer.as_ref().ok_or(Refusal::NoUpdate)?;
         transfer.check_peer(peer)?;
@@ -252,6 +258,7 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
         Ok(Reply::Aborted)
     }
 
+    #[inline(never)]
     fn rollback(&mut self, peer: Peer) -> Result<Reply, Refusal> {
         if let Some(transfer) = &self.device.transfer {
             transfer.make_way(peer, self.device.clock.uptime_ms())?;
