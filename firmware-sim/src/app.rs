@@ -73,6 +73,7 @@ impl<C: Clock> Device<C> {
     /// Decides which blob is active, checks all of it and opens it in place.
     ///
     /// Flash without a blob that can be used does not stop it: it answers, and says what is wrong.
+    #[inline(never)]
     pub fn epoch<'e, R: MappedFlash>(&'e mut self, regions: &'e mut Regions<R>) -> Epoch<'e, R, C> {
         self.health = Health::new();
         let booted = storage::boot(regions);
@@ -93,7 +94,7 @@ impl<C: Clock> Device<C> {
         });
         let blob = match (active, stored) {
             (Some(region), Some(stored)) => blob_bytes(region, stored.length)
-                .and_then(RayBlob::open)
+                .and_then(storage::open)
                 .map_err(OpenError::code),
             _ => Err(booted.open_error),
         };
@@ -162,6 +163,7 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
         }
     }
 
+    #[inline(never)]
     fn status(&mut self) -> Status {
         let mut slots = self.slots;
         let update = self.device.transfer.as_ref().map(Transfer::status);
@@ -184,6 +186,7 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
         }
     }
 
+    #[inline(never)]
     fn measure(&mut self, matches: &[Match]) -> Result<Reply, Refusal> {
         let blob = opened(&self.blob)?;
         let health = &mut self.device.health;
@@ -195,6 +198,7 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
         Ok(Reply::SelfTested(self_test::report(opened(&self.blob)?)))
     }
 
+    #[inline(never)]
     fn begin_update(&mut self, peer: Peer, new: &NewBlob) -> Result<Reply, Refusal> {
         let now_ms = self.device.clock.uptime_ms();
         if let Some(transfer) = &mut self.device.transfer {
@@ -226,6 +230,7 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
         Ok(Reply::Receiving { received: 0 })
     }
 
+    #[inline(never)]
     fn store(&mut self, peer: Peer, chunk: &Chunk) -> Result<Reply, Refusal> {
         let now_ms = self.device.clock.uptime_ms();
         let transfer = self.device.transfer.as_mut().ok_or(Refusal::NoUpdate)?;
@@ -238,6 +243,7 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
         Ok(Reply::Receiving { received: outcome? })
     }
 
+    #[inline(never)]
     fn finish_update(&mut self, peer: Peer) -> Result<Reply, Refusal> {
         let transfer = self.device.transfer.as_ref().ok_or(Refusal::NoUpdate)?;
         transfer.check_peer(peer)?;
@@ -272,6 +278,7 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
         Ok(Reply::Aborted)
     }
 
+    #[inline(never)]
     fn rollback(&mut self, peer: Peer) -> Result<Reply, Refusal> {
         if let Some(transfer) = &self.device.transfer {
             transfer.make_way(peer, self.device.clock.uptime_ms())?;

@@ -1,5 +1,5 @@
 #![doc = include_str!("../README.md")]
-#![cfg_attr(not(feature = "std"), no_std)]
+#![cfg_attr(not(any(feature = "std", feature = "sim-flash")), no_std)]
 
 pub mod app;
 pub mod cobs;
@@ -24,5 +24,5 @@ pub mod flash_file;
 pub mod host;
 #[cfg(feature = "std")]
 pub mod qemu;
-#[cfg(feature = "std")]
+#[cfg(feature = "sim-flash")]
 pub mod sim_flash;

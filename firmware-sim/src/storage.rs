@@ -93,6 +93,7 @@ pub struct Booted {
 /// else the next time.
 ///
 /// It never fails: flash that cannot be written leaves the decision as it is.
+#[inline(never)]
 pub fn boot<R: MappedFlash>(regions: &mut Regions<R>) -> Booted {
     let Regions {
         slots: [slot_0, slot_1],
@@ -146,6 +147,7 @@ pub fn boot<R: MappedFlash>(regions: &mut Regions<R>) -> Booted {
 }
 
 /// The record that a slot's log stands for, made to last.
+#[inline(never)]
 fn settle<R: MappedFlash>(slot: &mut R) -> Option<Record> {
     let log = Log::read(slot);
     if log.is_settled() {
@@ -164,6 +166,7 @@ fn settle<R: MappedFlash>(slot: &mut R) -> Option<Record> {
 }
 
 /// What a slot holds, by its record.
+#[inline(never)]
 fn inspect<R: MappedFlash>(index: u8, slot: &R, record: Option<Record>) -> SlotState {
     let Some(record) = record else {
         return SlotState::Empty;
@@ -189,7 +192,7 @@ fn inspect<R: MappedFlash>(index: u8, slot: &R, record: Option<Record>) -> SlotS
 /// Any [`OpenError`], among them the checksum of the record that is not that of the bytes.
 pub fn blob_of<R: MappedFlash>(slot: &R, record: Record) -> Result<RayBlob<'_>, OpenError> {
     let bytes = blob_bytes(slot, record.length)?;
-    let blob = RayBlob::open(bytes)?;
+    let blob = open(bytes)?;
     let computed = checksum(bytes);
     if computed != record.checksum {
         return Err(OpenError::BadCrc {
@@ -198,6 +201,15 @@ pub fn blob_of<R: MappedFlash>(slot: &R, record: Record) -> Result<RayBlob<'_>, 
         });
     }
     Ok(blob)
+}
+
+/// [`RayBlob::open`], which is long, once in the image.
+///
+/// # Errors
+/// Any [`OpenError`].
+#[inline(never)]
+pub fn open(bytes: &[u8]) -> Result<RayBlob<'_>, OpenError> {
+    RayBlob::open(bytes)
 }
 
 /// The first bytes behind the log.
@@ -229,6 +241,7 @@ fn open_error(slots: [SlotState; 2]) -> u8 {
 
 /// Programs `bytes` at `start`, which may end inside a unit: the rest of it stays blank. Then reads
 /// back.
+#[inline(never)]
 pub(crate) fn program<R: NorFlash>(slot: &mut R, start: u32, bytes: &[u8]) -> Result<(), Refusal> {
     for (address, unit) in (start..).step_by(UNIT).zip(bytes.chunks(UNIT)) {
         let mut padded = [0xff; UNIT];

@@ -7,6 +7,7 @@ use ray_runtime::{PixelPoint, RayBlob};
 use crate::protocol::SelfTestReport;
 
 /// Asks all of them.
+#[inline(never)]
 pub fn report(blob: &RayBlob<'_>) -> SelfTestReport {
     let mut report = SelfTestReport {
         tests: 0,

@@ -99,6 +99,7 @@ pub struct Log {
 
 impl Log {
     /// Reads the log at the start of a slot. What cannot be read counts as damaged.
+    #[inline(never)]
     pub fn read<R: NorFlash>(slot: &mut R) -> Self {
         let entries = (R::ERASE_SIZE / ENTRY_LENGTH) as u32;
         let mut log = Self {
@@ -146,6 +147,7 @@ impl Log {
     ///
     /// # Errors
     /// [`Refusal::LogFull`], or [`Refusal::FlashFailed`] when several entries failed in a row.
+    #[inline(never)]
     pub fn append<R: NorFlash>(&self, slot: &mut R, record: Record) -> Result<(), Refusal> {
         let bytes = record.to_entry();
         let mut outcome = Err(Refusal::LogFull);
@@ -163,6 +165,7 @@ impl Log {
     ///
     /// # Errors
     /// As [`Log::append`], and [`Refusal::LogFull`] if there is no reserve left.
+    #[inline(never)]
     pub fn commit<R: NorFlash>(slot: &mut R, record: Record) -> Result<(), Refusal> {
         let before = Self::read(slot);
         if !before.has_room() {

@@ -15,6 +15,7 @@ const MAGIC: [u8; 4] = *b"RigF";
 const HEAD_LENGTH: usize = 12;
 
 /// The factory record at the start of this region, if there is a whole one.
+#[inline(never)]
 pub fn read<R: MappedFlash>(factory: &R) -> Option<Rig> {
     let (head, rest) = factory.mapped().split_first_chunk::<HEAD_LENGTH>()?;
     let &[a, b, c, d, l0, l1, l2, l3, s0, s1, s2, s3] = head;
@@ -49,6 +50,7 @@ pub fn write<R: MappedFlash>(factory: &mut R, rig: &Rig) -> Result<(), Refusal> 
 ///
 /// # Errors
 /// [`Refusal::OtherRig`] with the first difference.
+#[inline(never)]
 pub fn compare(blob: &RayBlob<'_>, rig: &Rig) -> Result<(), Refusal> {
     let other = |camera: usize, what, expected, found| {
         Err(Refusal::OtherRig {

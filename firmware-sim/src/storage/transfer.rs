@@ -147,6 +147,7 @@ impl Transfer {
     /// # Errors
     /// [`Refusal::WrongOffset`] and [`Refusal::BadChunk`], after which the transfer can go on;
     /// [`Refusal::FlashFailed`], after which it cannot.
+    #[inline(never)]
     pub fn store<R: MappedFlash>(
         &mut self,
         slot: &mut R,
@@ -200,6 +201,7 @@ impl Transfer {
     ///
     /// # Errors
     /// [`Refusal::Incomplete`], after which the transfer can go on; otherwise why it cannot be taken.
+    #[inline(never)]
     pub fn check<R: MappedFlash>(
         &self,
         slot: &mut R,

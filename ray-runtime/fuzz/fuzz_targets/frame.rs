@@ -1,4 +1,5 @@
-//! Whatever bytes come over the link: no panic, and the next valid request is answered.
+//! Whatever bytes come over the link: no panic, and the next valid request is answered, with the blob
+//! that was active before.
 //!
 //! An input that begins with 1 is the body of one frame, sealed here with the right checksum, which no
 //! mutation would find; any other is the stream of bytes itself.
@@ -8,23 +9,39 @@
 use std::sync::LazyLock;
 
 use firmware_sim::app::Device;
-use firmware_sim::frame::{DELIMITER, FrameReader, FrameWriter, Received};
-use firmware_sim::port::{BlobStore, Clock};
-use firmware_sim::protocol::{Match, Reply, Request, Sighting};
+use firmware_sim::frame::{DELIMITER, FrameReader, FrameWriter, Received, checksum};
+use firmware_sim::port::Clock;
+use firmware_sim::protocol::{Chunk, MAX_CHUNK, Match, NewBlob, Reply, Request, Sighting};
 use firmware_sim::session::Session;
+use firmware_sim::sim_flash::{BLOCK, SimFlash};
 use libfuzzer_sys::fuzz_target;
-use ray_runtime::Aligned;
+use ray_runtime::{Aligned, RayBlob};
 use serde::ser::{Serialize, SerializeTuple, Serializer};
 
-struct Flash;
-
-impl BlobStore for Flash {
-    fn active_blob(&self) -> &[u8] {
-        static BLOB: &Aligned<[u8]> =
-            &Aligned(*include_bytes!("../../../data/golden/stereo-v3-small.rays"));
-        &BLOB.0
+/// A flash that was sent the golden blob.
+static FLASH: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    static BLOB: &Aligned<[u8]> =
+        &Aligned(*include_bytes!("../../../data/golden/stereo-v3-small.rays"));
+    let bytes = &BLOB.0;
+    let mut flash = SimFlash::blank(5, 0).expect("five blocks are enough");
+    assert!(bytes.len() <= BLOCK);
+    let mut regions = flash.regions();
+    let mut device = Device::new("fuzz", Stopped);
+    let mut epoch = device.epoch(&mut regions);
+    let mut ask = |request| assert!(!matches!(epoch.respond_to(0, &request), Reply::Refused(_)));
+    ask(Request::BeginUpdate(NewBlob {
+        length: bytes.len() as u32,
+        checksum: checksum(bytes),
+        identity: *RayBlob::open(bytes).expect("a golden blob").identity(),
+        rig_serial: None,
+    }));
+    for (offset, bytes) in (0..).step_by(MAX_CHUNK).zip(bytes.chunks(MAX_CHUNK)) {
+        let bytes = heapless::Vec::from_slice(bytes).expect("a chunk");
+        ask(Request::Chunk(Chunk { offset, bytes }));
     }
-}
+    ask(Request::FinishUpdate);
+    flash.contents().to_vec()
+});
 
 struct Stopped;
 
@@ -49,7 +66,10 @@ static VALID: LazyLock<Vec<u8>> = LazyLock::new(|| {
 });
 
 fuzz_target!(|input: &[u8]| {
-    let mut device = Device::boot("fuzz", &Flash, Stopped);
+    let mut flash = SimFlash::with_contents(&FLASH, 0).expect("whole blocks");
+    let mut regions = flash.regions();
+    let mut device = Device::new("fuzz", Stopped);
+    let mut device = device.epoch(&mut regions);
     let mut session = Session::new();
     let mut writer = FrameWriter::new();
     let stream = match input {
