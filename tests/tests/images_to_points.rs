@@ -1,14 +1,18 @@
 //! From rendered images to points out of the simulated device, against the truth: with optics
-//! whose rays all meet, and with optics whose rays do not.
+//! whose rays all meet, and with optics whose rays do not. The blob is flashed to the host's device and to
+//! the Cortex-M in QEMU, which keep it through a restart and give the host's bits.
 
 use calib_offline::adjust::residual::linearize;
+use calib_offline::demo::DeviceCheck;
 use calib_offline::demo::device::check;
 use calib_offline::geometry::PixelPoint;
 use calib_offline::report::Calibration;
 use calib_offline::simulate::{MatchSet, OpticsKind, Scene};
+use firmware_sim::client::DeviceClient;
+use firmware_sim::flash_file::FlashFile;
+use firmware_sim::host::SimulatedDevice;
 use firmware_sim::qemu::{QemuDevice, build_image};
 use ray_runtime::RayBlob;
-use std::fs;
 use workspace_tests::{
     aligned, calibrate, loopback, measure_on_device, packed, pairs, record, small_scene,
     working_distance_mm,
@@ -52,7 +56,7 @@ fn central_optics() {
     let cameras = &calibration.rig.cameras;
     assert!(cameras.iter().all(|camera| camera.field.is_central()));
     every_pixel_has_the_ray_of_the_field(&calibration);
-    the_cortex_m_gives_the_bits_of_the_host(&scene, &calibration);
+    devices_keep_the_blob_and_give_the_bits_of_the_host(&scene, &calibration);
 }
 
 #[test]
@@ -61,7 +65,7 @@ fn rays_that_do_not_meet() {
     let cameras = &calibration.rig.cameras;
     assert!(cameras.iter().all(|camera| !camera.field.is_central()));
     every_pixel_has_the_ray_of_the_field(&calibration);
-    the_cortex_m_gives_the_bits_of_the_host(&scene, &calibration);
+    devices_keep_the_blob_and_give_the_bits_of_the_host(&scene, &calibration);
 }
 
 /// The blob on its way through a file and the runtime, against the calibration on its way through
@@ -97,20 +101,41 @@ fn every_pixel_has_the_ray_of_the_field(calibration: &Calibration) {
     }
 }
 
-/// Needs QEMU and a bare-metal toolchain; `tests/run` installs them first.
-fn the_cortex_m_gives_the_bits_of_the_host(scene: &Scene, calibration: &Calibration) {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("rig.rays");
+/// Flashes the blob to both devices, switches them off and on, and compares their answers with the
+/// runtime's here. Needs QEMU and a bare-metal toolchain; `tests/run` installs them first.
+fn devices_keep_the_blob_and_give_the_bits_of_the_host(scene: &Scene, calibration: &Calibration) {
     let packed = packed(calibration);
-    fs::write(&file, &packed.bytes).unwrap();
-    let image = build_image("device").unwrap();
-    let device = QemuDevice::start(loopback(), &image, Some(&file)).unwrap();
-    let blob = aligned(&packed);
-    let blob = RayBlob::open(&blob).unwrap();
+    let bytes = aligned(&packed);
+    let blob = RayBlob::open(&bytes).unwrap();
     // So what is compared are standard deviations as well.
     assert_eq!(blob.uncertain_pairs().count(), 1);
-    let checked = check(device.address(), &blob, &pairs(scene, 500)).unwrap();
-    assert_eq!(checked.device, "firmware-sim cortex-m");
-    assert_eq!((checked.matches, checked.different), (500, 0));
-    assert!(checked.points > 400, "{checked:?}");
+    let asked = pairs(scene, 500);
+    let image = build_image("device").unwrap();
+    // Either device goes on with what the other left in the same file.
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("device.flash");
+    let expect = |checked: DeviceCheck, device: &str| {
+        assert_eq!(checked.device, device);
+        assert_eq!((checked.matches, checked.different), (500, 0));
+        assert!(checked.points > 400 && checked.is_equal(), "{checked:?}");
+    };
+    let in_qemu = |is_new: bool| {
+        let device = QemuDevice::start(loopback(), &image, Some(&file)).unwrap();
+        let mut client = DeviceClient::connect(&format!("tcp:{}", device.address())).unwrap();
+        assert_eq!(client.status().unwrap().blob.is_err(), is_new);
+        drop(client);
+        expect(
+            check(device.address(), &blob, &bytes, &asked).unwrap(),
+            "firmware-sim cortex-m",
+        );
+    };
+    in_qemu(true);
+    in_qemu(false);
+    let FlashFile { flash, kept_in } = FlashFile::open(&file, None).unwrap();
+    let device = SimulatedDevice::start_with(loopback(), flash).unwrap();
+    expect(
+        check(device.address(), &blob, &bytes, &asked).unwrap(),
+        "firmware-sim host",
+    );
+    drop(kept_in);
 }
