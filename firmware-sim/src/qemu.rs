@@ -1,6 +1,8 @@
 //! The same application as a Cortex-M4F image in QEMU, its UART on a TCP port.
 
-use std::io::{ErrorKind, Write};
+mod memory;
+
+use std::io::ErrorKind;
 use std::net::{SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
@@ -8,14 +10,12 @@ use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use tempfile::NamedTempFile;
 use thiserror::Error;
 
 use crate::client::{ClientError, DeviceClient};
-use crate::flash_file::{self, FLASH_LENGTH, FlashFile, FlashFileError, Kept};
+use crate::flash_file::{self, FLASH_LENGTH, FlashFile, FlashFileError};
 
-/// Where the emulated flash starts in the board's memory.
-const FLASH_START: usize = 0x2100_0000;
+use memory::{Backing, Memory};
 
 /// From the start of QEMU to the first answer of the device. It takes about a quarter of a second;
 /// the rest is for machines under load.
@@ -110,40 +110,6 @@ pub struct QemuDevice {
     address: SocketAddr,
     /// Held until QEMU has ended.
     _flash: Arc<Backing>,
-}
-
-/// The file that QEMU maps as the board's flash.
-#[derive(Debug)]
-enum Backing {
-    Kept(Kept),
-    Forgotten(NamedTempFile),
-}
-
-impl Backing {
-    fn of(FlashFile { flash, kept_in }: FlashFile) -> std::io::Result<Self> {
-        if let Some(kept) = kept_in {
-            return Ok(Self::Kept(kept));
-        }
-        let mut file = NamedTempFile::new()?;
-        file.write_all(flash.contents())?;
-        Ok(Self::Forgotten(file))
-    }
-
-    /// For QEMU as its standard output, to which it writes nothing: a copy of the lock, so that the
-    /// file stays locked until QEMU has ended, should this process be killed.
-    fn lock(&self) -> std::io::Result<Stdio> {
-        match self {
-            Self::Kept(kept) => Ok(kept.lock.try_clone()?.into()),
-            Self::Forgotten(_) => Ok(std::io::stderr().into()),
-        }
-    }
-
-    fn path(&self) -> &Path {
-        match self {
-            Self::Kept(kept) => &kept.path,
-            Self::Forgotten(file) => file.path(),
-        }
-    }
 }
 
 impl QemuDevice {
@@ -413,74 +379,15 @@ fn run_to_end_with(
     })
 }
 
-/// What the board's flash is.
-enum Memory<'a> {
-    /// Memory full of zeros.
-    Zero,
-    /// Memory that starts with the contents of this file, for checks that only read.
-    StartsWith(&'a Path),
-    /// This very file, of the flash's length: what the device writes is in it at once.
-    File(&'a Path),
-}
-
 /// QEMU on this board with this image, set to end with its parent; the caller adds serial line and
 /// monitor.
 fn qemu_command(image: &Path, memory: &Memory<'_>) -> Result<Command, QemuError> {
     let mut command = Command::new("sh");
     command.args(["-c", ENDS_WITH_PARENT, "sh", "qemu-system-arm"]);
-    match memory {
-        Memory::File(path) => {
-            // What QEMU takes for this board's main memory is the PSRAM that stands for the flash.
-            let file = in_option(path);
-            let size = FLASH_LENGTH;
-            command.args([
-                "-object",
-                &format!("memory-backend-file,id=flash,size={size},mem-path={file},share=on"),
-                "-machine",
-                "mps2-an386,memory-backend=flash",
-            ]);
-        }
-        Memory::StartsWith(_) | Memory::Zero => {
-            command.args(["-machine", "mps2-an386"]);
-        }
-    }
+    command.args(memory.arguments()?);
     command.args(["-cpu", "cortex-m4", "-display", "none"]);
     command.arg("-kernel").arg(image);
-    if let Memory::StartsWith(path) = memory
-        && length_of(path)? > 0
-    {
-        let file = in_option(path);
-        command.args([
-            "-device",
-            &format!("loader,file={file},addr={FLASH_START:#x},force-raw=on"),
-        ]);
-    }
     Ok(command)
-}
-
-/// In QEMU's options a comma ends a value unless it is doubled.
-fn in_option(path: &Path) -> String {
-    path.display().to_string().replace(',', ",,")
-}
-
-/// Length of the contents for a flash. The file is opened as well as measured, so that one that cannot
-/// be read is found out here and not by QEMU.
-fn length_of(path: &Path) -> Result<u64, QemuError> {
-    let unreadable = |source| QemuError::Io {
-        what: format!("the flash file {}", path.display()),
-        source,
-    };
-    let length = std::fs::File::open(path)
-        .and_then(|file| file.metadata())
-        .map_err(unreadable)?
-        .len();
-    if length > FLASH_LENGTH as u64 {
-        return Err(QemuError::FlashTooLong {
-            path: path.to_owned(),
-            length,
-        });
-    }
-    Ok(length)
 }
 
 /// Makes sure that QEMU is installed.

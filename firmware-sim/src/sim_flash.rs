@@ -420,14 +420,13 @@ impl Chip {
         for (address, (byte, &wanted)) in (address..).zip(place.iter_mut().zip(wanted)) {
             let changing = *byte ^ wanted;
             match cut {
-                Cut::Clean => {}
                 Cut::Torn => *byte ^= self.random.next() as u8 & changing,
                 Cut::Weak if changing != 0 => {
                     let shift = 8 * (address % UNIT);
                     self.weak.entry(address / UNIT).or_default().mask |=
                         u64::from(changing) << shift;
                 }
-                Cut::Weak => {}
+                Cut::Clean | Cut::Weak => {}
             }
         }
     }
