@@ -229,7 +229,16 @@ fn what_cannot_be_done_is_said_and_nothing_is_written() {
     }
     drop(silent);
 
-    // One that takes the blobs of one owner only.
+    // The device is as it was.
+    ask(path, &address, "status")
+        .assert_code(0)
+        .assert_prints(&["up for", "0 updates"]);
+}
+
+#[test]
+fn a_device_with_an_owner_takes_no_unsigned_blob() {
+    let folder = folder();
+    let path = folder.path();
     let any_port = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
     let key =
         PublicKey::from_hex("3d4017c3e843895a92b70aa74d1b7ebc9c982ccf2ec4968cc0cd55f12af4660c");
@@ -243,15 +252,10 @@ fn what_cannot_be_done_is_said_and_nothing_is_written() {
         .assert_code(2)
         .assert_says(&["takes signed blobs only", "--signature"]);
     let with = |file| [&flash[..], &["--signature", file]].concat();
-    run(path, &with("m.csv"))
+    run(path, &with("fast.rays"))
         .assert_code(2)
-        .assert_says(&["m.csv: is not an Ed25519 signature: 64 bytes"]);
+        .assert_says(&["fast.rays: is not an Ed25519 signature: 64 bytes"]);
     run(path, &with("zeros.sig"))
         .assert_code(2)
         .assert_says(&["the signature is not of this blob"]);
-
-    // The device is as it was.
-    ask(path, &address, "status")
-        .assert_code(0)
-        .assert_prints(&["up for", "0 updates"]);
 }

@@ -14,9 +14,9 @@ fn key(seed: u8) -> SigningKey {
     SigningKey::from_bytes(&[seed; 32])
 }
 
-fn hex(key: &SigningKey) -> String {
-    let bytes = key.verifying_key().to_bytes();
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+/// The public half of a key.
+fn public(key: &SigningKey) -> PublicKey {
+    PublicKey::from_bytes(key.verifying_key().to_bytes())
 }
 
 fn signature(key: &SigningKey, blob: &[u8]) -> Signature {
@@ -73,7 +73,7 @@ fn check(client: &mut DeviceClient, owner: &SigningKey) {
 #[test]
 fn the_simulated_device_takes_signed_blobs_only() {
     let owner = key(7);
-    let trust = Trust::Signed(PublicKey::from_hex(&hex(&owner)).unwrap());
+    let trust = Trust::Signed(public(&owner));
     let flash = flash_file::blank(None).unwrap();
     let any_port = "127.0.0.1:0".parse().unwrap();
     let device = SimulatedDevice::start_trusting(any_port, flash, trust).unwrap();
@@ -94,7 +94,7 @@ fn a_device_without_a_key_takes_any_blob_signed_or_not() {
 #[test]
 fn the_image_in_qemu_takes_signed_blobs_only() {
     let owner = key(7);
-    let image = qemu::build_signed_image("device_signed", &hex(&owner)).unwrap();
+    let image = qemu::build_signed_image("device_signed", &public(&owner).to_hex()).unwrap();
     let device = QemuDevice::start("127.0.0.1:0".parse().unwrap(), &image, None).unwrap();
     let mut client = DeviceClient::connect(&format!("tcp:{}", device.address())).unwrap();
     check(&mut client, &owner);
@@ -106,7 +106,7 @@ fn the_image_in_qemu_takes_signed_blobs_only() {
 fn verifying_takes_a_counted_number_of_instructions() {
     // QEMU's time per instruction is 2^10 ns, a tick of the timer 40 ns.
     const TICKS_PER_INSTRUCTION: f64 = 1024.0 / 40.0;
-    let image = qemu::build_signed_image("counting_signature", &hex(&key(7))).unwrap();
+    let image = qemu::build_signed_image("counting_signature", &public(&key(7)).to_hex()).unwrap();
     let blob = tempfile::NamedTempFile::new().unwrap();
     let output = qemu::run_counting(&image, blob.path(), 10).unwrap();
     assert!(output.status.success());

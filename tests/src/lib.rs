@@ -9,6 +9,7 @@
 use calib_offline::board::BoardSpec;
 use calib_offline::dataset::Dataset;
 use calib_offline::demo::known::Pair;
+use calib_offline::device::on_wire;
 use calib_offline::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
 use calib_offline::geometry::SensorSize;
 use calib_offline::pack::{AlignedBytes, PackSettings, Packed, pack};
@@ -21,7 +22,6 @@ use calib_offline::simulate::{
 };
 use firmware_sim::client::DeviceClient;
 use firmware_sim::host::SimulatedDevice;
-use firmware_sim::protocol::{Match, Sighting};
 use nalgebra::Vector3;
 use std::path::{Path, PathBuf};
 
@@ -96,7 +96,8 @@ pub fn measure_on_device(blob: &[u8], scene: &Scene, set: MatchSet) -> (TruthErr
     let device = SimulatedDevice::start(loopback(), blob).expect("a port is free");
     let address = format!("tcp:{}", device.address());
     let mut client = DeviceClient::connect(&address).expect("the device answers");
-    let measured = client.measure(&on_wire(&asked)).expect("it measures");
+    let measured = client.measure(&on_wire(&sightings(&asked)));
+    let measured = measured.expect("it measures");
     let points: Vec<PointWithTruth> = asked
         .iter()
         .zip(&measured)
@@ -119,28 +120,12 @@ pub fn loopback() -> std::net::SocketAddr {
     std::net::SocketAddr::from(([127, 0, 0, 1], 0))
 }
 
-fn on_wire(matches: &[TrueMatch]) -> Vec<Match> {
-    let sighting = |camera: u8, asked: &TrueMatch| {
-        let pixel = asked.pixels[usize::from(camera)];
-        Sighting {
-            camera,
-            u_px: pixel.u as f32,
-            v_px: pixel.v as f32,
-        }
-    };
-    (0..)
-        .zip(matches)
-        .map(|(id, asked)| Match {
-            id,
-            first: sighting(0, asked),
-            second: sighting(1, asked),
-        })
-        .collect()
-}
-
 /// A scene's matches as pairs of sightings.
 pub fn pairs(scene: &Scene, count: usize) -> Vec<Pair> {
-    let matches = scene.matches(MatchSet::Points, count);
+    sightings(&scene.matches(MatchSet::Points, count))
+}
+
+fn sightings(matches: &[TrueMatch]) -> Vec<Pair> {
     let pixel = |asked: &TrueMatch, k: usize| [asked.pixels[k].u as f32, asked.pixels[k].v as f32];
     matches
         .iter()

@@ -7,7 +7,7 @@ use crate::device::on_wire;
 use crate::report::Calibration;
 use firmware_sim::client::{ClientError, DeviceClient, FlashOptions};
 use firmware_sim::host::SimulatedDevice;
-use firmware_sim::protocol::{Match, Point};
+use firmware_sim::protocol::Point;
 use firmware_sim::qemu::{QemuDevice, QemuError, image_path, require_qemu};
 use ray_runtime::{MeasureError, PixelPoint, RayBlob};
 use serde::Serialize;
@@ -84,15 +84,7 @@ pub fn check(
     let mut client = DeviceClient::connect(&format!("tcp:{address}"))?;
     let flashed = client.flash(blob, &FlashOptions::default(), &mut |_| {})?;
     let self_test = client.self_test()?;
-    let matches: Vec<Match> = (0..)
-        .zip(pairs)
-        .map(|(id, [first, second])| Match {
-            id,
-            first: on_wire(*first),
-            second: on_wire(*second),
-        })
-        .collect();
-    let answers = client.measure(&matches)?;
+    let answers = client.measure(&on_wire(pairs))?;
     let different = answers
         .iter()
         .zip(pairs)

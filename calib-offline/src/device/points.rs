@@ -50,15 +50,7 @@ impl BatchSource for DeviceSource {
     }
 
     fn points(&mut self, matches: &[[Sighting<f32>; 2]]) -> Result<Answers<f32>, DeviceError> {
-        let asked: Vec<Match> = (0..)
-            .zip(matches)
-            .map(|(id, [first, second])| Match {
-                id,
-                first: on_wire(*first),
-                second: on_wire(*second),
-            })
-            .collect();
-        let measured = self.client.measure(&asked)?;
+        let measured = self.client.measure(&on_wire(matches))?;
         let answers = measured.into_iter().map(|answer| match answer.outcome {
             Ok(found) => Ok(Ok(Point {
                 point_mm: found.point_mm,
@@ -75,13 +67,22 @@ impl BatchSource for DeviceSource {
     }
 }
 
-/// A blob has 64 cameras at most.
-pub fn on_wire((camera_idx, [u_px, v_px]): Sighting<f32>) -> protocol::Sighting {
-    protocol::Sighting {
+/// Matches as they travel, numbered from 0.
+pub fn on_wire(matches: &[[Sighting<f32>; 2]]) -> Vec<Match> {
+    let sighting = |(camera_idx, [u_px, v_px]): Sighting<f32>| protocol::Sighting {
+        // A blob has 64 cameras at most.
         camera: u8::try_from(camera_idx).unwrap_or(u8::MAX),
         u_px,
         v_px,
-    }
+    };
+    (0..)
+        .zip(matches)
+        .map(|(id, [first, second])| Match {
+            id,
+            first: sighting(*first),
+            second: sighting(*second),
+        })
+        .collect()
 }
 
 /// Why there is no point, by the runtime's code.

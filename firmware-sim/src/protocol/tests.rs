@@ -319,53 +319,8 @@ fn the_longest_messages_fit_a_frame() {
         id: u32::MAX,
         outcome: Ok(point),
     };
+    let status = longest_status();
     let longest: Name = name(&"n".repeat(MAX_NAME));
-    let camera = CameraStatus {
-        name: longest.clone(),
-        width_px: u32::MAX,
-        height_px: u32::MAX,
-    };
-    let blob = BlobStatus {
-        identity: [0xff; 16],
-        length: u32::MAX,
-        camera_count: u8::MAX,
-        cameras: vec(&vec![camera.clone(); MAX_CAMERAS_LISTED]),
-    };
-    let stored = StoredBlob {
-        slot: 1,
-        sequence: u32::MAX,
-        length: u32::MAX,
-        checksum: u32::MAX,
-        ..STORED
-    };
-    let status = Status {
-        uptime_ms: u64::MAX,
-        answered: u32::MAX,
-        refused: u32::MAX,
-        blob: Ok(blob),
-        active_slot: Some(1),
-        slots: [SlotState::Holds(stored); 2],
-        update: Some(UpdateStatus {
-            length: u32::MAX,
-            received: u32::MAX,
-            identity: [0xff; 16],
-        }),
-        max_blob: u32::MAX,
-        updates: u32::MAX,
-        rollbacks: u32::MAX,
-        rig: Some(Rig {
-            serial: longest.clone(),
-            cameras: vec(&vec![camera; MAX_CAMERAS_LISTED]),
-        }),
-        gaps: Some(GapReport {
-            points: u32::MAX,
-            predicted: Some(Predicted {
-                points: u32::MAX,
-                ..GAPS.predicted.unwrap()
-            }),
-            ..GAPS
-        }),
-    };
     let hello = Hello {
         device: longest.clone(),
         firmware: longest,
@@ -406,6 +361,56 @@ fn the_longest_messages_fit_a_frame() {
         Reply::Refused(Refusal::Oversized { limit: u16::MAX }),
     ] {
         assert!(writer.seal(u16::MAX, &reply).is_some(), "{reply:?}");
+    }
+}
+
+fn longest_status() -> Status {
+    let longest: Name = name(&"n".repeat(MAX_NAME));
+    let camera = CameraStatus {
+        name: longest.clone(),
+        width_px: u32::MAX,
+        height_px: u32::MAX,
+    };
+    let blob = BlobStatus {
+        identity: [0xff; 16],
+        length: u32::MAX,
+        camera_count: u8::MAX,
+        cameras: vec(&vec![camera.clone(); MAX_CAMERAS_LISTED]),
+    };
+    let stored = StoredBlob {
+        slot: 1,
+        sequence: u32::MAX,
+        length: u32::MAX,
+        checksum: u32::MAX,
+        ..STORED
+    };
+    Status {
+        uptime_ms: u64::MAX,
+        answered: u32::MAX,
+        refused: u32::MAX,
+        blob: Ok(blob),
+        active_slot: Some(1),
+        slots: [SlotState::Holds(stored); 2],
+        update: Some(UpdateStatus {
+            length: u32::MAX,
+            received: u32::MAX,
+            identity: [0xff; 16],
+        }),
+        max_blob: u32::MAX,
+        updates: u32::MAX,
+        rollbacks: u32::MAX,
+        rig: Some(Rig {
+            serial: longest.clone(),
+            cameras: vec(&vec![camera; MAX_CAMERAS_LISTED]),
+        }),
+        gaps: Some(GapReport {
+            points: u32::MAX,
+            predicted: Some(Predicted {
+                points: u32::MAX,
+                ..GAPS.predicted.unwrap()
+            }),
+            ..GAPS
+        }),
     }
 }
 

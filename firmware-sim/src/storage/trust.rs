@@ -58,6 +58,11 @@ pub struct PublicKey([u8; 32]);
 
 #[cfg(feature = "signed")]
 impl PublicKey {
+    /// From its 32 bytes.
+    pub const fn from_bytes(bytes: [u8; 32]) -> Self {
+        Self(bytes)
+    }
+
     /// From its 64 hexadecimal digits; `None` for anything else. Whether it is a point of the curve shows
     /// when a signature is verified: none passes with one that is not.
     pub const fn from_hex(text: &str) -> Option<Self> {
@@ -87,7 +92,13 @@ impl PublicKey {
     /// Its 64 hexadecimal digits.
     #[cfg(feature = "std")]
     pub fn to_hex(&self) -> std::string::String {
-        self.0.iter().map(|byte| format!("{byte:02x}")).collect()
+        use core::fmt::Write;
+        let mut hex = std::string::String::with_capacity(64);
+        for byte in self.0 {
+            // Writing to a string cannot fail.
+            let _ = write!(hex, "{byte:02x}");
+        }
+        hex
     }
 
     /// Whether the owner of the key signed these bytes.

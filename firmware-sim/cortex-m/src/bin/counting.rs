@@ -9,7 +9,7 @@
 use core::hint::black_box;
 
 use cortex_m_rt::entry;
-use cortex_m_semihosting::{debug, hio};
+use cortex_m_semihosting::hio;
 use firmware_cortex_m::machine;
 use firmware_sim::counting::{Job, Probe, Record, job_start};
 use ray_runtime::{PixelPoint, RayBlob, format, triangulate_pair};
@@ -28,13 +28,7 @@ type Work = fn(&Task<'_>) -> bool;
 #[entry]
 fn main() -> ! {
     cortex_m::interrupt::disable();
-    let status = match run() {
-        Some(()) => debug::EXIT_SUCCESS,
-        None => debug::EXIT_FAILURE,
-    };
-    loop {
-        debug::exit(status);
-    }
+    machine::end(run().is_some())
 }
 
 fn run() -> Option<()> {

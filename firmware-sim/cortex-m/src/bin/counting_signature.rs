@@ -9,7 +9,7 @@ use core::fmt::Write;
 use core::hint::black_box;
 
 use cortex_m_rt::entry;
-use cortex_m_semihosting::{debug, hio};
+use cortex_m_semihosting::hio;
 use firmware_cortex_m::machine;
 use firmware_sim::protocol::Signature;
 use firmware_sim::storage::trust::PublicKey;
@@ -21,13 +21,7 @@ const SIGNATURE: [u8; 64] = *include_bytes!("counting_signature.bin");
 #[entry]
 fn main() -> ! {
     cortex_m::interrupt::disable();
-    let status = match run() {
-        Some(()) => debug::EXIT_SUCCESS,
-        None => debug::EXIT_FAILURE,
-    };
-    loop {
-        debug::exit(status);
-    }
+    machine::end(run().is_some())
 }
 
 fn run() -> Option<()> {
@@ -47,7 +41,5 @@ fn run() -> Option<()> {
 
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo) -> ! {
-    loop {
-        debug::exit(debug::EXIT_FAILURE);
-    }
+    machine::end(false)
 }

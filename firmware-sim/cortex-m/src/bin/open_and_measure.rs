@@ -6,7 +6,7 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use cortex_m_semihosting::{debug, hprintln};
+use cortex_m_semihosting::hprintln;
 use firmware_cortex_m::machine;
 use ray_runtime::{PixelPoint, RayBlob};
 
@@ -31,7 +31,7 @@ fn main() -> ! {
         Ok(blob) => blob,
         Err(error) => {
             hprintln!("no blob: {}", error);
-            exit(debug::EXIT_FAILURE)
+            machine::end(false)
         }
     };
     hprintln!(
@@ -52,7 +52,7 @@ fn main() -> ! {
         Ok(count) => hprintln!("{} self-tests give the bits they should", count),
         Err(failure) => {
             hprintln!("self-test {} gives other bits", failure.test);
-            exit(debug::EXIT_FAILURE)
+            machine::end(false)
         }
     }
     for [u0, v0, u1, v1] in MATCHES {
@@ -76,18 +76,11 @@ fn main() -> ! {
             Err(error) => hprintln!("{}", error),
         }
     }
-    exit(debug::EXIT_SUCCESS)
-}
-
-/// Ends QEMU with this status.
-fn exit(status: debug::ExitStatus) -> ! {
-    loop {
-        debug::exit(status);
-    }
+    machine::end(true)
 }
 
 #[panic_handler]
 fn panic(info: &core::panic::PanicInfo) -> ! {
     hprintln!("{}", info);
-    exit(debug::EXIT_FAILURE)
+    machine::end(false)
 }

@@ -4,7 +4,7 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use cortex_m_semihosting::{debug, hprintln};
+use cortex_m_semihosting::hprintln;
 use firmware_cortex_m::machine;
 use firmware_sim::same_bits::digest;
 use ray_runtime::RayBlob;
@@ -17,29 +17,25 @@ fn main() -> ! {
     let flash = machine::flash();
     let opened = RayBlob::stated_len(flash)
         .and_then(|length| RayBlob::open(flash.get(..length as usize).unwrap_or(flash)));
-    let status = match opened.map(|blob| digest(&blob, MATCHES)) {
+    let is_well = match opened.map(|blob| digest(&blob, MATCHES)) {
         Ok(Some(digest)) => {
             hprintln!("{:08x} {}", digest.checksum, digest.points);
-            debug::EXIT_SUCCESS
+            true
         }
         Ok(None) => {
             hprintln!("the blob has not two cameras");
-            debug::EXIT_FAILURE
+            false
         }
         Err(error) => {
             hprintln!("no blob: {}", error);
-            debug::EXIT_FAILURE
+            false
         }
     };
-    loop {
-        debug::exit(status);
-    }
+    machine::end(is_well)
 }
 
 #[panic_handler]
 fn panic(info: &core::panic::PanicInfo) -> ! {
     hprintln!("{}", info);
-    loop {
-        debug::exit(debug::EXIT_FAILURE);
-    }
+    machine::end(false)
 }
