@@ -22,9 +22,7 @@ use crate::{LookupError, MeasureError, OpenError, PixelPoint, Ray, lookup};
 /// other check than whether the pixel is in the calibrated area.
 #[derive(Debug, Clone, Copy)]
 pub struct RayBlob<'a> {
-    bytes: &'a [u8],
-    /// The same bytes as pairs of numbers.
-    pairs: &'a [[f32; 2]],
+    views: Views<'a>,
     records: &'a [[u32; RECORD_WORDS]],
     identity: &'a [u8; IDENTITY_LEN],
     frame: &'a str,
@@ -70,8 +68,7 @@ impl<'a> RayBlob<'a> {
         let (meta, camera_meta) =
             postcard::take_from_bytes::<Meta<'a>>(meta_bytes).map_err(|_| OpenError::BadMeta)?;
         let blob = Self {
-            bytes,
-            pairs,
+            views: Views { bytes, pairs },
             records,
             identity: meta.identity.try_into().map_err(|_| OpenError::BadMeta)?,
             frame: meta.frame,
@@ -159,12 +156,12 @@ impl<'a> RayBlob<'a> {
 
     /// Length of the blob, bytes.
     pub const fn len(&self) -> usize {
-        self.bytes.len()
+        self.views.bytes.len()
     }
 
     /// Whether the blob has no bytes: never.
     pub const fn is_empty(&self) -> bool {
-        self.bytes.is_empty()
+        self.views.bytes.is_empty()
     }
 
     /// Questions whose answers' bits are known.
@@ -186,7 +183,7 @@ impl<'a> RayBlob<'a> {
     /// Whether the pixel of a camera has a ray.
     pub fn is_calibrated(&self, camera: usize, pixel: PixelPoint) -> bool {
         self.record(camera)
-            .is_ok_and(|record| lookup::is_calibrated(self.bytes, record, pixel))
+            .is_ok_and(|record| lookup::is_calibrated(self.views.bytes, record, pixel))
     }
 
     /// The point that two cameras see: the midpoint of the common perpendicular of their rays.
@@ -274,7 +271,7 @@ impl<'a> RayBlob<'a> {
     ) -> Result<lookup::MovingRay, MeasureError> {
         self.record(camera)
             .and_then(|record| {
-                if lookup::is_calibrated(self.bytes, record, pixel) {
+                if lookup::is_calibrated(self.views.bytes, record, pixel) {
                     self.views().lookup_moving(record, pixel)
                 } else {
                     Err(LookupError::Outside)
@@ -301,11 +298,8 @@ impl<'a> RayBlob<'a> {
         })
     }
 
-    const fn views(&self) -> Views<'a> {
-        Views {
-            bytes: self.bytes,
-            pairs: self.pairs,
-        }
+    const fn views(&self) -> &Views<'a> {
+        &self.views
     }
 
     fn record(&self, camera: usize) -> Result<Record<'a>, LookupError> {
@@ -345,7 +339,7 @@ impl<'a> RayBlob<'a> {
                 return Err(OpenError::BadMeta);
             }
             let check = CameraCheck {
-                views: self.views(),
+                views: *self.views(),
                 camera: camera as u16,
                 record: Record(words),
                 version,

@@ -3,7 +3,7 @@
 use crate::format::{Encoding, Form, Record};
 use crate::polynomial::{self, Dual, Number};
 use crate::quantized;
-use crate::spline::{Knots, Window};
+use crate::spline;
 use crate::{LookupError, PixelPoint, Ray};
 use nalgebra::Vector3;
 
@@ -27,8 +27,8 @@ pub(crate) trait Evaluated: Number {
     fn along_u(value: f32, per_px: f32) -> Self;
     /// A coordinate that grows with v at a rate, 1/px.
     fn along_v(value: f32, per_px: f32) -> Self;
-    /// The spline at the window.
-    fn blend(window: &Window<'_>, knots: Knots<'_>) -> Option<[Self; 2]>;
+    /// The spline of f32 knots at the window.
+    fn blend(window: &spline::Window<'_>, knots: spline::Knots<'_>) -> Option<[Self; 2]>;
 }
 
 impl Evaluated for f32 {
@@ -41,7 +41,7 @@ impl Evaluated for f32 {
     }
 
     #[inline(always)]
-    fn blend(window: &Window<'_>, knots: Knots<'_>) -> Option<[Self; 2]> {
+    fn blend(window: &spline::Window<'_>, knots: spline::Knots<'_>) -> Option<[Self; 2]> {
         window.blend(knots)
     }
 }
@@ -63,14 +63,14 @@ impl Evaluated for Dual {
         }
     }
 
-    fn blend(window: &Window<'_>, knots: Knots<'_>) -> Option<[Self; 2]> {
+    fn blend(window: &spline::Window<'_>, knots: spline::Knots<'_>) -> Option<[Self; 2]> {
         window.blend_moving(knots)
     }
 }
 
 const CENTRAL_PATCHES: u32 = number(Form::Patches, true);
 const NON_CENTRAL_PATCHES: u32 = number(Form::Patches, false);
-const CENTRAL_SPLINE: u32 = number(Form::Spline, true);
+pub(crate) const CENTRAL_SPLINE: u32 = number(Form::Spline, true);
 const NON_CENTRAL_SPLINE: u32 = number(Form::Spline, false);
 
 const fn number(form: Form, is_central: bool) -> u32 {
@@ -80,41 +80,40 @@ const fn number(form: Form, is_central: bool) -> u32 {
 impl Views<'_> {
     /// The ray of a pixel, rig frame.
     #[inline(always)]
-    pub fn lookup(self, record: Record<'_>, pixel: PixelPoint) -> Result<Ray, LookupError> {
+    pub fn lookup(&self, record: Record<'_>, pixel: PixelPoint) -> Result<Ray, LookupError> {
+        let encoding = record.encoding();
+        if !matches!(encoding, CENTRAL_PATCHES | NON_CENTRAL_PATCHES) {
+            return self.lookup_other(record, pixel);
+        }
         if !is_calibrated(self.bytes, record, pixel) {
             return Err(LookupError::Outside);
         }
-        match record.encoding() {
-            CENTRAL_PATCHES => {
-                let [s] = self.patch::<1, f32>(record, pixel)?;
-                Ok(central_ray(record, s))
-            }
-            NON_CENTRAL_PATCHES => {
-                let [s, n] = self.patch::<2, f32>(record, pixel)?;
-                Ok(shifted_ray(record, Sample { s, n }))
-            }
-            _ => self.lookup_other(record, pixel),
+        if encoding == CENTRAL_PATCHES {
+            let [s] = self.patch::<1, f32>(record, pixel)?;
+            Ok(central_ray(record, s))
+        } else {
+            let [s, n] = self.patch::<2, f32>(record, pixel)?;
+            Ok(shifted_ray(record, Sample { s, n }))
         }
     }
 
-    /// The same of other forms than patches.
+    /// The same of other forms than patches, which take more time than this call.
     #[inline(never)]
-    fn lookup_other(self, record: Record<'_>, pixel: PixelPoint) -> Result<Ray, LookupError> {
-        let sample = self.sample_other(record, pixel)?;
-        Ok(ray(record, sample))
+    fn lookup_other(&self, record: Record<'_>, pixel: PixelPoint) -> Result<Ray, LookupError> {
+        if !is_calibrated(self.bytes, record, pixel) {
+            return Err(LookupError::Outside);
+        }
+        if matches!(record.encoding(), CENTRAL_SPLINE | NON_CENTRAL_SPLINE) {
+            return self.lookup_spline(record, pixel);
+        }
+        quantized::lookup(self, record, from_edge(record, pixel))
     }
 
-    #[inline(always)]
-    fn sample_other<T: Evaluated>(
-        self,
-        record: Record<'_>,
-        pixel: PixelPoint,
-    ) -> Result<Sample<T>, LookupError> {
-        match record.encoding() {
-            CENTRAL_SPLINE | NON_CENTRAL_SPLINE => self.spline(record, pixel),
-            _ => quantized::sample(self, record, pixel),
-        }
-        .ok_or(LookupError::Outside)
+    /// [`lookup`](Self::lookup) of the form of old versions.
+    #[inline(never)]
+    fn lookup_spline(&self, record: Record<'_>, pixel: PixelPoint) -> Result<Ray, LookupError> {
+        let sample = spline::sample(self, record, pixel).ok_or(LookupError::Outside)?;
+        Ok(ray(record, sample))
     }
 
     /// The ray of a pixel of the region, calibrated or not, and how it moves with u and with v: of a
@@ -123,7 +122,7 @@ impl Views<'_> {
     /// It is for size, where `lookup` is for speed.
     #[inline(never)]
     pub fn lookup_moving(
-        self,
+        &self,
         record: Record<'_>,
         pixel: PixelPoint,
     ) -> Result<MovingRay, LookupError> {
@@ -142,7 +141,10 @@ impl Views<'_> {
                 let [s, n] = self.patch(record, pixel)?;
                 Sample { s, n }
             }
-            _ => self.sample_other(record, pixel)?,
+            CENTRAL_SPLINE | NON_CENTRAL_SPLINE => {
+                spline::sample(self, record, pixel).ok_or(LookupError::Outside)?
+            }
+            _ => quantized::sample_moving(self, record, pixel).ok_or(LookupError::Outside)?,
         };
         let part = |part: fn(Dual) -> f32| Sample {
             s: sample.s.map(part),
@@ -159,7 +161,7 @@ impl Views<'_> {
     /// The cubics of a pixel's cell: of the half-angle vector, and of the offset if `MAPS` is 2.
     #[inline(always)]
     fn patch<const MAPS: usize, T: Evaluated>(
-        self,
+        &self,
         record: Record<'_>,
         pixel: PixelPoint,
     ) -> Result<[[T; 2]; MAPS], LookupError> {
@@ -174,30 +176,12 @@ impl Views<'_> {
         let coefficients = self.pairs.get(start..).ok_or(LookupError::Outside)?;
         let (maps, _) = coefficients.as_chunks::<10>();
         let maps = maps.first_chunk::<MAPS>().ok_or(LookupError::Outside)?;
-        Ok(maps.each_ref().map(|map| polynomial::cubic(map, x, y)))
-    }
-
-    /// The sample of a table of f32 knots. `None` cannot happen in a blob that was opened: the size of
-    /// the table was checked.
-    #[inline(never)]
-    fn spline<T: Evaluated>(self, record: Record<'_>, pixel: PixelPoint) -> Option<Sample<T>> {
-        let is_central = record.encoding() == CENTRAL_SPLINE;
-        let knots = |channels: usize| {
-            let first = (record.grid_offset() >> 3) as usize + channels;
-            Some(Knots::F32 {
-                pairs: self.pairs.get(first..)?,
-                stride: if is_central { 1 } else { 2 },
-            })
-        };
-        let window = Window::at(record, pixel);
-        Some(Sample {
-            s: T::blend(&window, knots(0)?)?,
-            n: if is_central {
-                [T::from(0.0); 2]
-            } else {
-                T::blend(&window, knots(1)?)?
-            },
-        })
+        // Not by `map`, which the compiler does not always inline.
+        let mut values = [[x; 2]; MAPS];
+        for (value, map) in values.iter_mut().zip(maps) {
+            *value = polynomial::cubic(map, x, y);
+        }
+        Ok(values)
     }
 }
 
@@ -217,6 +201,7 @@ impl MovingRay {
 }
 
 /// The ray of a sample of a camera's table, rig frame.
+#[inline(always)]
 fn ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
     // Odd numbers are central.
     if record.encoding() & 1 == 1 {
@@ -227,7 +212,7 @@ fn ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
 }
 
 #[inline(always)]
-fn central_ray(record: Record<'_>, s: [f32; 2]) -> Ray {
+pub(crate) fn central_ray(record: Record<'_>, s: [f32; 2]) -> Ray {
     Ray {
         origin_mm: record.translation_mm().into(),
         direction: direction(record.rotation(), s),
@@ -235,10 +220,19 @@ fn central_ray(record: Record<'_>, s: [f32; 2]) -> Ray {
 }
 
 #[inline(always)]
-fn shifted_ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
+pub(crate) fn shifted_ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
     Ray {
         origin_mm: origin(record.rotation(), record.translation_mm(), sample),
         direction: direction(record.rotation(), sample.s),
+    }
+}
+
+/// A pixel from the outer edge of the region.
+#[inline(always)]
+pub(crate) fn from_edge(record: Record<'_>, pixel: PixelPoint) -> PixelPoint {
+    PixelPoint {
+        u: pixel.u - record.axis_u().min_px,
+        v: pixel.v - record.axis_v().min_px,
     }
 }
 

@@ -55,35 +55,44 @@ impl Mul for Dual {
     }
 }
 
-/// The polynomial of a total degree with these coefficients, and whatever stands behind them; `None`
-/// if there are too few.
-pub(crate) fn evaluate<T: Number>(
+/// The polynomial of a total degree with these coefficients, and whatever stands behind them.
+///
+/// A pair, because that comes back in registers. Where there are too few coefficients, what is missing
+/// counts as zero: the size of a table is checked when it is opened.
+#[inline(always)]
+pub(crate) fn evaluate(coefficients: &[[f32; 2]], degree: u8, x: f32, y: f32) -> (f32, f32) {
+    match coefficients.first_chunk() {
+        Some(all) if degree == 3 => {
+            let [a, b] = cubic(all, x, y);
+            (a, b)
+        }
+        _ => row_by_row(coefficients, degree, x, y),
+    }
+}
+
+/// [`evaluate`] in a loop, the same bits.
+#[inline(never)]
+pub(crate) fn row_by_row<T: Number>(
     coefficients: &[[f32; 2]],
     degree: u8,
     x: T,
     y: T,
-) -> Option<[T; 2]> {
-    if degree == 3 {
-        return Some(cubic(coefficients.first_chunk()?, x, y));
-    }
-    row_by_row(coefficients, degree, x, y)
-}
-
-fn row_by_row<T: Number>(coefficients: &[[f32; 2]], degree: u8, x: T, y: T) -> Option<[T; 2]> {
+) -> (T, T) {
     let mut rest = coefficients;
-    let mut sum: [T; 2] = [0.0.into(); 2];
+    let (mut sum_a, mut sum_b): (T, T) = (0.0.into(), 0.0.into());
     for others in 0..=usize::from(degree) {
-        let ([a, b], after) = rest.split_first()?;
-        let (row, after) = after.split_at_checked(others)?;
-        let (mut a, mut b) = (T::from(*a), T::from(*b));
+        let Some((row, after)) = rest.split_at_checked(others + 1) else {
+            break;
+        };
+        let (mut a, mut b): (T, T) = (0.0.into(), 0.0.into());
         for [next_a, next_b] in row {
             a = a * x + (*next_a).into();
             b = b * x + (*next_b).into();
         }
-        sum = [sum[0] * y + a, sum[1] * y + b];
+        (sum_a, sum_b) = (sum_a * y + a, sum_b * y + b);
         rest = after;
     }
-    Some(sum)
+    (sum_a, sum_b)
 }
 
 /// [`evaluate`] of a cubic, written out.
@@ -120,7 +129,7 @@ mod tests {
             for (k, (j, i)) in powers(degree).enumerate() {
                 let mut coefficients = [[0.0; 2]; coefficient_count(9)];
                 coefficients[k] = [1.0, -2.0];
-                let found = evaluate(&coefficients, degree as u8, x, y).unwrap();
+                let found = evaluate(&coefficients, degree as u8, x, y);
                 // Powers of 3/4 and 1/2 up to the ninth fit 24 binary digits.
                 let expected = x.powi(i as i32) * y.powi(j as i32);
                 assert_eq!(found, [expected, -2.0 * expected], "{degree} {j} {i}");
