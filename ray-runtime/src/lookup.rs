@@ -80,40 +80,21 @@ const fn number(form: Form, is_central: bool) -> u32 {
 impl Views<'_> {
     /// The ray of a pixel, rig frame.
     #[inline(always)]
-    pub fn lookup(&self, record: Record<'_>, pixel: PixelPoint) -> Result<Ray, LookupError> {
-        let encoding = record.encoding();
-        if !matches!(encoding, CENTRAL_PATCHES | NON_CENTRAL_PATCHES) {
-            return self.lookup_other(record, pixel);
-        }
+    pub fn lookup(self, record: Record<'_>, pixel: PixelPoint) -> Result<Ray, LookupError> {
         if !is_calibrated(self.bytes, record, pixel) {
             return Err(LookupError::Outside);
         }
-        if encoding == CENTRAL_PATCHES {
-            let [s] = self.patch::<1, f32>(record, pixel)?;
-            Ok(central_ray(record, s))
-        } else {
-            let [s, n] = self.patch::<2, f32>(record, pixel)?;
-            Ok(shifted_ray(record, Sample { s, n }))
+        match record.encoding() {
+            CENTRAL_PATCHES => {
+                let [s] = self.patch::<1, f32>(record, pixel)?;
+                Ok(central_ray(record, s))
+            }
+            NON_CENTRAL_PATCHES => {
+                let [s, n] = self.patch::<2, f32>(record, pixel)?;
+                Ok(shifted_ray(record, Sample { s, n }))
+            }
+            _ => lookup_other(self.pairs, record, pixel),
         }
-    }
-
-    /// The same of other forms than patches, which take more time than this call.
-    #[inline(never)]
-    fn lookup_other(&self, record: Record<'_>, pixel: PixelPoint) -> Result<Ray, LookupError> {
-        if !is_calibrated(self.bytes, record, pixel) {
-            return Err(LookupError::Outside);
-        }
-        if matches!(record.encoding(), CENTRAL_SPLINE | NON_CENTRAL_SPLINE) {
-            return self.lookup_spline(record, pixel);
-        }
-        quantized::lookup(self, record, from_edge(record, pixel))
-    }
-
-    /// [`lookup`](Self::lookup) of the form of old versions.
-    #[inline(never)]
-    fn lookup_spline(&self, record: Record<'_>, pixel: PixelPoint) -> Result<Ray, LookupError> {
-        let sample = spline::sample(self, record, pixel).ok_or(LookupError::Outside)?;
-        Ok(ray(record, sample))
     }
 
     /// The ray of a pixel of the region, calibrated or not, and how it moves with u and with v: of a
@@ -122,7 +103,7 @@ impl Views<'_> {
     /// It is for size, where `lookup` is for speed.
     #[inline(never)]
     pub fn lookup_moving(
-        &self,
+        self,
         record: Record<'_>,
         pixel: PixelPoint,
     ) -> Result<MovingRay, LookupError> {
@@ -142,9 +123,9 @@ impl Views<'_> {
                 Sample { s, n }
             }
             CENTRAL_SPLINE | NON_CENTRAL_SPLINE => {
-                spline::sample(self, record, pixel).ok_or(LookupError::Outside)?
+                spline::sample(self.pairs, record, pixel).ok_or(LookupError::Outside)?
             }
-            _ => quantized::sample_moving(self, record, pixel).ok_or(LookupError::Outside)?,
+            _ => quantized::sample_moving(self.pairs, record, pixel).ok_or(LookupError::Outside)?,
         };
         let part = |part: fn(Dual) -> f32| Sample {
             s: sample.s.map(part),
@@ -161,7 +142,7 @@ impl Views<'_> {
     /// The cubics of a pixel's cell: of the half-angle vector, and of the offset if `MAPS` is 2.
     #[inline(always)]
     fn patch<const MAPS: usize, T: Evaluated>(
-        &self,
+        self,
         record: Record<'_>,
         pixel: PixelPoint,
     ) -> Result<[[T; 2]; MAPS], LookupError> {
@@ -183,6 +164,31 @@ impl Views<'_> {
         }
         Ok(values)
     }
+}
+
+/// The ray of a calibrated pixel from a table of another form than patches. Its arguments fit the
+/// registers, so that it takes the place of what calls it last, on the stack too.
+#[inline(never)]
+fn lookup_other(
+    pairs: &[[f32; 2]],
+    record: Record<'_>,
+    pixel: PixelPoint,
+) -> Result<Ray, LookupError> {
+    if matches!(record.encoding(), CENTRAL_SPLINE | NON_CENTRAL_SPLINE) {
+        return lookup_spline(pairs, record, pixel);
+    }
+    quantized::lookup(pairs, record, from_edge(record, pixel))
+}
+
+/// The same of the form of old versions.
+#[inline(never)]
+fn lookup_spline(
+    pairs: &[[f32; 2]],
+    record: Record<'_>,
+    pixel: PixelPoint,
+) -> Result<Ray, LookupError> {
+    let sample = spline::sample(pairs, record, pixel).ok_or(LookupError::Outside)?;
+    Ok(ray(record, sample))
 }
 
 /// A ray and its derivatives by the pixel.

@@ -57,34 +57,34 @@ impl Mul for Dual {
 
 /// The polynomial of a total degree with these coefficients, and whatever stands behind them.
 ///
-/// A pair, because that comes back in registers. Where there are too few coefficients, what is missing
-/// counts as zero: the size of a table is checked when it is opened.
+/// A pair, because that comes back in registers. Where there are too few coefficients, those that are
+/// missing do not count: the size of a table is checked when it is opened.
 #[inline(always)]
 pub(crate) fn evaluate(coefficients: &[[f32; 2]], degree: u8, x: f32, y: f32) -> (f32, f32) {
-    match coefficients.first_chunk() {
-        Some(all) if degree == 3 => {
-            let [a, b] = cubic(all, x, y);
-            (a, b)
-        }
-        _ => row_by_row(coefficients, degree, x, y),
-    }
+    let found = match degree {
+        3 => coefficients.first_chunk().map(|all| cubic(all, x, y).into()),
+        5 => coefficients.first_chunk().and_then(|all| fifth_degree(all, x, y)),
+        7 => coefficients.first_chunk().and_then(|all| seventh_degree(all, x, y)),
+        _ => None,
+    };
+    found.unwrap_or_else(|| row_by_row(coefficients, degree, x, y))
 }
 
 /// [`evaluate`] in a loop, the same bits.
 #[inline(never)]
-pub(crate) fn row_by_row<T: Number>(
-    coefficients: &[[f32; 2]],
-    degree: u8,
-    x: T,
-    y: T,
-) -> (T, T) {
-    let mut rest = coefficients;
-    let (mut sum_a, mut sum_b): (T, T) = (0.0.into(), 0.0.into());
-    for others in 0..=usize::from(degree) {
-        let Some((row, after)) = rest.split_at_checked(others + 1) else {
+pub(crate) fn row_by_row<T: Number>(coefficients: &[[f32; 2]], degree: u8, x: T, y: T) -> (T, T) {
+    let Some(([first_a, first_b], mut rest)) = coefficients.split_first() else {
+        return (0.0.into(), 0.0.into());
+    };
+    let (mut sum_a, mut sum_b) = (T::from(*first_a), T::from(*first_b));
+    for others in 1..=usize::from(degree) {
+        let Some(([a, b], after)) = rest.split_first() else {
             break;
         };
-        let (mut a, mut b): (T, T) = (0.0.into(), 0.0.into());
+        let Some((row, after)) = after.split_at_checked(others) else {
+            break;
+        };
+        let (mut a, mut b) = (T::from(*a), T::from(*b));
         for [next_a, next_b] in row {
             a = a * x + (*next_a).into();
             b = b * x + (*next_b).into();
@@ -93,6 +93,42 @@ pub(crate) fn row_by_row<T: Number>(
         rest = after;
     }
     (sum_a, sum_b)
+}
+
+/// The rows of a polynomial, written out: the compiler unrolls one loop, but not a loop of loops.
+macro_rules! written_out {
+    ($coefficients:expr, $x:expr, $y:expr, $($length:literal)*) => {{
+        let ([a, b], rest) = $coefficients.split_first()?;
+        let (sum_a, sum_b) = (*a, *b);
+        $(
+            let (row, rest) = rest.split_first_chunk::<$length>()?;
+            let (a, b) = along_x(row, $x);
+            let (sum_a, sum_b) = (sum_a * $y + a, sum_b * $y + b);
+        )*
+        let _: &[[f32; 2]] = rest;
+        Some((sum_a, sum_b))
+    }};
+}
+
+#[inline(never)]
+fn fifth_degree(coefficients: &[[f32; 2]; 21], x: f32, y: f32) -> Option<(f32, f32)> {
+    written_out!(coefficients, x, y, 2 3 4 5 6)
+}
+
+#[inline(never)]
+fn seventh_degree(coefficients: &[[f32; 2]; 36], x: f32, y: f32) -> Option<(f32, f32)> {
+    written_out!(coefficients, x, y, 2 3 4 5 6 7 8)
+}
+
+/// One row.
+#[inline(always)]
+fn along_x<const LENGTH: usize>(row: &[[f32; 2]; LENGTH], x: f32) -> (f32, f32) {
+    let [mut a, mut b] = row[0];
+    for [next_a, next_b] in &row[1..] {
+        a = a * x + next_a;
+        b = b * x + next_b;
+    }
+    (a, b)
 }
 
 /// [`evaluate`] of a cubic, written out.
@@ -132,26 +168,22 @@ mod tests {
                 let found = evaluate(&coefficients, degree as u8, x, y);
                 // Powers of 3/4 and 1/2 up to the ninth fit 24 binary digits.
                 let expected = x.powi(i as i32) * y.powi(j as i32);
-                assert_eq!(found, [expected, -2.0 * expected], "{degree} {j} {i}");
+                assert_eq!(found, (expected, -2.0 * expected), "{degree} {j} {i}");
             }
         }
-        let nine = [[1.0; 2]; 9];
-        assert!(evaluate(&nine, 2, x, y).is_some() && evaluate(&nine, 3, x, y).is_none());
     }
 
     #[test]
-    fn the_cubic_has_the_bits_of_the_general_scheme() {
-        let coefficients: [[f32; 2]; 10] =
+    fn what_is_written_out_has_the_bits_of_the_loop() {
+        let coefficients: [[f32; 2]; 36] =
             core::array::from_fn(|k| [libm::sinf(k as f32 * 1.7), libm::cosf(k as f32 * 0.9)]);
         for k in 0..100 {
             let (x, y) = (k as f32 / 99.0, (k * 37 % 100) as f32 / 99.0);
-            let written_out = cubic(&coefficients, x, y);
-            assert_eq!(
-                written_out.map(f32::to_bits),
-                row_by_row(&coefficients, 3, x, y)
-                    .unwrap()
-                    .map(f32::to_bits)
-            );
+            for degree in [3, 5, 7] {
+                let (a, b) = evaluate(&coefficients, degree, x, y);
+                let (c, d) = row_by_row(&coefficients, degree, x, y);
+                assert_eq!([a, b].map(f32::to_bits), [c, d].map(f32::to_bits));
+            }
         }
     }
 
@@ -160,11 +192,11 @@ mod tests {
         let coefficients: [[f32; 2]; 21] =
             core::array::from_fn(|k| [libm::sinf(k as f32 * 1.7), libm::cosf(k as f32 * 0.9)]);
         let (x, y) = (0.4, -0.7);
-        let at = |x: f32, y: f32| evaluate(&coefficients, 5, x, y).unwrap();
+        let at = |x: f32, y: f32| <[f32; 2]>::from(evaluate(&coefficients, 5, x, y));
         let dual = |value, by_u, by_v| Dual { value, by_u, by_v };
-        let found = evaluate(&coefficients, 5, dual(x, 2.0, 0.0), dual(y, 0.0, 4.0)).unwrap();
+        let (a, b) = row_by_row(&coefficients, 5, dual(x, 2.0, 0.0), dual(y, 0.0, 4.0));
         let h = 0.015625;
-        for (k, found) in found.into_iter().enumerate() {
+        for (k, found) in [a, b].into_iter().enumerate() {
             assert_eq!(found.value.to_bits(), at(x, y)[k].to_bits());
             // Central differences of degree 5: h^2 / 6 times third derivatives of up to 60, here 2e-3.
             let by_u = (at(x + h, y)[k] - at(x - h, y)[k]) / (2.0 * h);

@@ -10,7 +10,7 @@
 
 use crate::PixelPoint;
 use crate::format::{Axis, Record};
-use crate::lookup::{self, Evaluated, Sample, Views};
+use crate::lookup::{self, Evaluated, Sample};
 use crate::polynomial::{self, Dual};
 use crate::{LookupError, Ray};
 
@@ -20,12 +20,12 @@ use crate::{LookupError, Ray};
 /// for the offset: one call, before there is much to keep.
 #[inline(always)]
 pub(crate) fn lookup(
-    views: &Views<'_>,
+    pairs: &[[f32; 2]],
     record: Record<'_>,
     from_edge: PixelPoint,
 ) -> Result<Ray, LookupError> {
     // None of this is missing in a blob that was opened: the sizes of its parts were checked.
-    let table = Table::of(views, record).ok_or(LookupError::Outside)?;
+    let table = Table::of(pairs, record).ok_or(LookupError::Outside)?;
     let (direction, offset) = (Map::read(table.direction), Map::read(table.offset));
     // Odd numbers are central.
     let is_central = record.encoding() & 1 == 1;
@@ -53,17 +53,17 @@ pub(crate) fn lookup(
             lookup::shifted_ray(record, Sample { s, n })
         });
     }
-    lookup_any(views, record, from_edge)
+    lookup_any(pairs, record, from_edge)
 }
 
 /// [`lookup`] of any degrees and knots.
 #[inline(never)]
 fn lookup_any(
-    views: &Views<'_>,
+    pairs: &[[f32; 2]],
     record: Record<'_>,
     from_edge: PixelPoint,
 ) -> Result<Ray, LookupError> {
-    let table = Table::of(views, record).ok_or(LookupError::Outside)?;
+    let table = Table::of(pairs, record).ok_or(LookupError::Outside)?;
     let value = |map| table.map(Map::read(map), record, from_edge);
     let s = value(table.direction).ok_or(LookupError::Outside)?;
     if record.encoding() & 1 == 1 {
@@ -76,11 +76,11 @@ fn lookup_any(
 /// [`sample`], the same bits, and its derivatives by the pixel; for size, where that is for speed.
 #[inline(never)]
 pub(crate) fn sample_moving(
-    views: &Views<'_>,
+    pairs: &[[f32; 2]],
     record: Record<'_>,
     pixel: PixelPoint,
 ) -> Option<Sample<Dual>> {
-    let table = Table::of(views, record)?;
+    let table = Table::of(pairs, record)?;
     let mut maps = [[Dual::from(0.0); 2]; 2];
     // Odd numbers are central.
     let count = 2 - (record.encoding() & 1) as usize;
@@ -101,9 +101,9 @@ struct Table<'a> {
 
 impl<'a> Table<'a> {
     #[inline(always)]
-    fn of(views: &Views<'a>, record: Record<'_>) -> Option<Self> {
+    fn of(pairs: &'a [[f32; 2]], record: Record<'_>) -> Option<Self> {
         let start = (record.grid_offset() >> 3) as usize;
-        let pairs = views.pairs.get(start..)?;
+        let pairs = pairs.get(start..)?;
         let [direction_a, direction_b, offset_a, offset_b, scale] = pairs.first_chunk()?;
         Some(Self {
             pairs,
@@ -159,9 +159,9 @@ impl<'a> Table<'a> {
         let window = Window::at(record, from_edge);
         let (u, v) = (window.u, window.v);
         let ways = [
-            (weights(u), weights(v), 1.0),
-            (slopes(u), weights(v), axis_u.cells_per_px),
-            (weights(u), slopes(v), axis_v.cells_per_px),
+            (Weights::at(u), row_weights(v), 1.0),
+            (Weights::slopes(u), row_weights(v), axis_u.cells_per_px),
+            (Weights::at(u), row_slopes(v), axis_v.cells_per_px),
         ];
         for (way, (along_u, along_v, per_px)) in ways.into_iter().enumerate() {
             let left = if map.number_len() == 1 {
@@ -221,14 +221,14 @@ impl Map {
 #[inline(never)]
 fn left_of_words(knots: &[[f32; 2]], record: Record<'_>, from_edge: PixelPoint) -> (f32, f32) {
     let window = Window::at(record, from_edge);
-    as_numbers(window.blend_words(knots, weights(window.u), weights(window.v)))
+    as_numbers(window.blend_words(knots, Weights::at(window.u), row_weights(window.v)))
 }
 
 /// The same of i8.
 #[inline(never)]
 fn left_of_bytes(knots: &[[f32; 2]], record: Record<'_>, from_edge: PixelPoint) -> (f32, f32) {
     let window = Window::at(record, from_edge);
-    as_numbers(window.blend_bytes(knots, weights(window.u), weights(window.v)))
+    as_numbers(window.blend_bytes(knots, Weights::at(window.u), row_weights(window.v)))
 }
 
 #[inline(always)]
@@ -259,8 +259,14 @@ impl Window {
     #[inline(always)]
     fn at(record: Record<'_>, from_edge: PixelPoint) -> Self {
         let [cells_u, cells_v] = record.cells();
-        let (cell_u, u) = cell_and_share(record.axis_u(), from_edge.u, cells_u);
-        let (cell_v, v) = cell_and_share(record.axis_v(), from_edge.v, cells_v);
+        let axes = (record.axis_u(), record.axis_v());
+        // At the very end of a row the next cell may come out: its first three knots are the last of
+        // the row, and the fourth has no weight. There always is one, as a mask follows the knots.
+        let place_u = place(axes.0, from_edge.u);
+        // `open` saw to it that there is a cell, and not too many.
+        let place_v = place(axes.1, from_edge.v).min(cells_v.wrapping_shl(15).wrapping_sub(1));
+        let (cell_u, u) = cell_and_share(place_u);
+        let (cell_v, v) = cell_and_share(place_v);
         // No more cells than fit, as `open` saw.
         let stride = (cells_u + 3) as u16;
         Self {
@@ -278,7 +284,7 @@ impl Window {
         &self,
         knots: &[[f32; 2]],
         along_u: Weights,
-        along_v: Weights,
+        along_v: RowWeights,
     ) -> Option<[i32; 2]> {
         self.blend_rows(knots.as_flattened(), along_u, along_v, row_of_words)
     }
@@ -288,7 +294,7 @@ impl Window {
         &self,
         knots: &[[f32; 2]],
         along_u: Weights,
-        along_v: Weights,
+        along_v: RowWeights,
     ) -> Option<[i32; 2]> {
         self.blend_rows(bytemuck::cast_slice(knots), along_u, along_v, row_of_bytes)
     }
@@ -299,7 +305,7 @@ impl Window {
         &self,
         knots: &[K],
         along_u: Weights,
-        along_v: Weights,
+        along_v: RowWeights,
         row: impl Fn(&[K; 4], Weights) -> (i32, i32),
     ) -> Option<[i32; 2]> {
         let rows = knots.get(self.first..)?;
@@ -309,13 +315,11 @@ impl Window {
             return None;
         }
         let mut sums = [0; 2];
-        for j in 0..4 {
+        for (j, weight) in along_v.into_iter().enumerate() {
             let four = rows.get(j * stride..j * stride + 4)?;
             let (a, b) = row(four.first_chunk()?, along_u);
-            let two = if j < 2 { along_v.0 } else { along_v.1 };
-            let weight = i64::from(if j & 1 == 0 { low(two) } else { high(two) });
-            sums[0] += ((i64::from(a) * weight) >> 16) as i32;
-            sums[1] += ((i64::from(b) * weight) >> 16) as i32;
+            sums[0] += high_word(a, weight);
+            sums[1] += high_word(b, weight);
         }
         Some(sums)
     }
@@ -343,16 +347,19 @@ fn row_of_bytes(row: &[[i8; 2]; 4], weights: Weights) -> (i32, i32) {
     )
 }
 
-/// The cell of a coordinate that the axis contains, and the share of it that lies before it.
+/// Cells before a coordinate that the axis contains, in units of 2^-15: to half a unit, which moves
+/// the blend by less than the knots' own rounding, even if neighbors differ by all of their range.
 ///
-/// Both are taken from one product, whose round-off of 2^-24 of the axis moves a place by less than
-/// the share's own unit on grids of up to 512 cells; only what the polynomial leaves sees it.
+/// They are taken from one product, whose round-off of 2^-24 of the axis moves a place by less than
+/// the unit on grids of up to 512 cells; only what the polynomial leaves sees it.
 #[inline(always)]
-fn cell_and_share(axis: Axis, from_edge_px: f32, cells: u32) -> (usize, i32) {
-    let cells_before = from_edge_px * axis.cells_per_px;
-    // `open` saw to it that there is a cell, and not too many.
-    let last = cells.wrapping_shl(15).wrapping_sub(1);
-    let place = ((cells_before * ONE as f32) as u32).min(last);
+fn place(axis: Axis, from_edge_px: f32) -> u32 {
+    (from_edge_px * axis.cells_per_px * ONE as f32 + 0.5) as u32
+}
+
+/// The cell, and the share of it that lies before the place.
+#[inline(always)]
+fn cell_and_share(place: u32) -> (usize, i32) {
     ((place >> 15) as usize, (place & 0x7fff).cast_signed())
 }
 
@@ -377,29 +384,59 @@ fn high(word: i32) -> i32 {
     word >> 16
 }
 
-/// The weights of the cubic B-spline at a share of a cell, all negative.
-///
-/// The signs of the two axes cancel. (The compiler knows of positive ones that they are, and then
-/// multiplies them as numbers without a sign, for which there is no such instruction.)
+impl Weights {
+    /// The weights of the cubic B-spline at a share of a cell, all negative; as those along the other
+    /// axis are too, the signs cancel. (Of positive ones the compiler knows that they are, and
+    /// multiplies them as numbers without a sign, for which there are no such instructions.)
+    #[inline(always)]
+    fn at(share: i32) -> Self {
+        let behind = ONE - share;
+        let (a, d) = (sixth_of_cube(behind) >> 16, sixth_of_cube(share) >> 16);
+        Self::new(-a, 2 * a - d - behind, 2 * d - a - share, -d)
+    }
+
+    /// Their derivatives by the share.
+    fn slopes(share: i32) -> Self {
+        let [a, b, c, d] = slopes(share);
+        Self::new(a, b, c, d)
+    }
+}
+
+/// Weights of four rows, in units of 2^-31.
+type RowWeights = [i32; 4];
+
+/// [`Weights::at`] along v.
 #[inline(always)]
-fn weights(share: i32) -> Weights {
+fn row_weights(share: i32) -> RowWeights {
     let behind = ONE - share;
     let (a, d) = (sixth_of_cube(behind), sixth_of_cube(share));
-    Weights::new(a, d - 2 * a - behind, a - 2 * d - share, d)
+    // A one does not fit, but what comes out does.
+    let b = (2 * a).wrapping_sub(d).wrapping_sub(behind << 16);
+    let c = (2 * d).wrapping_sub(a).wrapping_sub(share << 16);
+    [-a, b, c, -d]
 }
 
-/// Their derivatives by the share.
-fn slopes(share: i32) -> Weights {
+fn row_slopes(share: i32) -> RowWeights {
+    slopes(share).map(|slope| slope << 16)
+}
+
+fn slopes(share: i32) -> [i32; 4] {
     let behind = ONE - share;
     let (a, d) = ((behind * behind) >> 16, -((share * share) >> 16));
-    Weights::new(a, ONE + d - 2 * a, a - 2 * d - ONE, d)
+    [a, ONE + d - 2 * a, a - 2 * d - ONE, d]
 }
 
-/// A sixth of the cube of a share, negative.
+/// A sixth of the cube of a share, in units of 2^-31.
 #[inline(always)]
 fn sixth_of_cube(share: i32) -> i32 {
-    // 2^17 / 6, of a cube in units of 2^-30.
-    const SIXTH: i64 = 21845;
-    let cube = ((share * share) >> 15) * share;
-    ((i64::from(cube) * -SIXTH) >> 32) as i32
+    // 2^18 / 6: the square is in units of 2^-30, and 32 binary digits are left out.
+    const SIXTH: i32 = 43691;
+    let (square, sixth) = (share * share, share * SIXTH);
+    let product = u64::from(square.cast_unsigned()) * u64::from(sixth.cast_unsigned());
+    (product >> 32) as i32
+}
+
+#[inline(always)]
+fn high_word(a: i32, b: i32) -> i32 {
+    ((i64::from(a) * i64::from(b)) >> 32) as i32
 }

@@ -3,14 +3,14 @@
 use crate::PixelPoint;
 use crate::format::Record;
 use crate::grid::{Place, blend_slopes};
-use crate::lookup::{CENTRAL_SPLINE, Evaluated, Sample, Views};
+use crate::lookup::{CENTRAL_SPLINE, Evaluated, Sample};
 use crate::polynomial::Dual;
 
 /// The sample of a table of f32 knots. `None` cannot happen in a blob that was opened: the size of
 /// the table was checked.
 #[inline(never)]
 pub(crate) fn sample<T: Evaluated>(
-    views: &Views<'_>,
+    pairs: &[[f32; 2]],
     record: Record<'_>,
     pixel: PixelPoint,
 ) -> Option<Sample<T>> {
@@ -18,7 +18,7 @@ pub(crate) fn sample<T: Evaluated>(
     let knots = |channels: usize| {
         let first = (record.grid_offset() >> 3) as usize + channels;
         Some(Knots {
-            pairs: views.pairs.get(first..)?,
+            pairs: pairs.get(first..)?,
             stride: if is_central { 1 } else { 2 },
         })
     };
