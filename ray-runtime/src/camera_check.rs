@@ -4,7 +4,8 @@ use crate::OpenError;
 use crate::check::{check_padding, is_moderate, is_rotation, same_bits};
 use crate::error::Table;
 use crate::format::{
-    self, Axis, CameraMeta, Encoding, MAX_CELLS, MAX_DEGREE, QuantizedHeader, QuantizedMap, Record,
+    self, Axis, CameraMeta, Encoding, Form, MAX_CELLS, MAX_DEGREE, QuantizedHeader, QuantizedMap,
+    Record,
 };
 use crate::lookup::Views;
 
@@ -24,7 +25,10 @@ impl CameraCheck<'_> {
     pub fn run(&self, meta: &CameraMeta<'_>, start: usize) -> Result<usize, OpenError> {
         let (record, bytes) = (self.record, self.views.bytes);
         let encoding = Encoding::from_number(record.encoding())
-            .filter(|encoding| encoding.since_version() <= self.version)
+            .filter(|encoding| {
+                encoding.since_version() <= self.version
+                    && (cfg!(feature = "old-versions") || encoding.form != Form::Spline)
+            })
             .ok_or(OpenError::UnknownEncoding {
                 camera: self.camera,
                 found: record.encoding(),

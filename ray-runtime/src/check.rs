@@ -48,7 +48,7 @@ pub(crate) fn checked_header(bytes: &[u8]) -> Result<Header, OpenError> {
         });
     }
     if usize::from(header.header_len) != HEADER_LEN
-        || (header.version == OLDEST_VERSION && header.pair_count != 0)
+        || (header.version == 1 && header.pair_count != 0)
         || !bytes.len().is_multiple_of(ALIGNMENT)
         || !(1..=MAX_CAMERAS).contains(&header.camera_count)
     {

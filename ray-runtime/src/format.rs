@@ -24,9 +24,9 @@ use serde::{Deserialize, Serialize};
 pub const MAGIC: [u8; 4] = *b"RAYS";
 /// The format version that the packer writes and the newest that this library reads.
 pub const VERSION: u16 = 3;
-/// The oldest version that this library reads. Version 2 has no other [`Form`] than splines, version 1
+/// The oldest version that this library reads: without the feature `old-versions`, the newest. Version 2 has no other [`Form`] than splines, version 1
 /// besides that no [`PairHeader`].
-pub const OLDEST_VERSION: u16 = 1;
+pub const OLDEST_VERSION: u16 = if cfg!(feature = "old-versions") { 1 } else { 3 };
 /// Length of the header of all versions.
 pub const HEADER_LEN: usize = 24;
 /// Every part after the metadata starts on a multiple of this.

@@ -18,6 +18,7 @@ mod polynomial;
 mod quantized;
 mod ray;
 mod self_test;
+#[cfg(feature = "old-versions")]
 mod spline;
 mod triangulate;
 mod uncertainty;

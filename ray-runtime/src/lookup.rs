@@ -3,6 +3,7 @@
 use crate::format::{Encoding, Form, Record};
 use crate::polynomial::{self, Dual, Number};
 use crate::quantized;
+#[cfg(feature = "old-versions")]
 use crate::spline;
 use crate::{LookupError, PixelPoint, Ray};
 use nalgebra::Vector3;
@@ -28,6 +29,7 @@ pub(crate) trait Evaluated: Number {
     /// A coordinate that grows with v at a rate, 1/px.
     fn along_v(value: f32, per_px: f32) -> Self;
     /// The spline of f32 knots at the window.
+    #[cfg(feature = "old-versions")]
     fn blend(window: &spline::Window<'_>, knots: spline::Knots<'_>) -> Option<[Self; 2]>;
 }
 
@@ -40,6 +42,7 @@ impl Evaluated for f32 {
         value
     }
 
+    #[cfg(feature = "old-versions")]
     #[inline(always)]
     fn blend(window: &spline::Window<'_>, knots: spline::Knots<'_>) -> Option<[Self; 2]> {
         window.blend(knots)
@@ -63,6 +66,7 @@ impl Evaluated for Dual {
         }
     }
 
+    #[cfg(feature = "old-versions")]
     fn blend(window: &spline::Window<'_>, knots: spline::Knots<'_>) -> Option<[Self; 2]> {
         window.blend_moving(knots)
     }
@@ -70,7 +74,9 @@ impl Evaluated for Dual {
 
 const CENTRAL_PATCHES: u32 = number(Form::Patches, true);
 const NON_CENTRAL_PATCHES: u32 = number(Form::Patches, false);
+#[cfg(feature = "old-versions")]
 pub(crate) const CENTRAL_SPLINE: u32 = number(Form::Spline, true);
+#[cfg(feature = "old-versions")]
 const NON_CENTRAL_SPLINE: u32 = number(Form::Spline, false);
 
 const fn number(form: Form, is_central: bool) -> u32 {
@@ -122,6 +128,7 @@ impl Views<'_> {
                 let [s, n] = self.patch(record, pixel)?;
                 Sample { s, n }
             }
+            #[cfg(feature = "old-versions")]
             CENTRAL_SPLINE | NON_CENTRAL_SPLINE => {
                 spline::sample(self.pairs, record, pixel).ok_or(LookupError::Outside)?
             }
@@ -174,6 +181,7 @@ fn lookup_other(
     record: Record<'_>,
     pixel: PixelPoint,
 ) -> Result<Ray, LookupError> {
+    #[cfg(feature = "old-versions")]
     if matches!(record.encoding(), CENTRAL_SPLINE | NON_CENTRAL_SPLINE) {
         return lookup_spline(pairs, record, pixel);
     }
@@ -181,6 +189,7 @@ fn lookup_other(
 }
 
 /// The same of the form of old versions.
+#[cfg(feature = "old-versions")]
 #[inline(never)]
 fn lookup_spline(
     pairs: &[[f32; 2]],

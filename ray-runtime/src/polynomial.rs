@@ -62,9 +62,15 @@ impl Mul for Dual {
 #[inline(always)]
 pub(crate) fn evaluate(coefficients: &[[f32; 2]], degree: u8, x: f32, y: f32) -> (f32, f32) {
     let found = match degree {
-        3 => coefficients.first_chunk().map(|all| cubic(all, x, y).into()),
-        5 => coefficients.first_chunk().and_then(|all| fifth_degree(all, x, y)),
-        7 => coefficients.first_chunk().and_then(|all| seventh_degree(all, x, y)),
+        3 => coefficients
+            .first_chunk()
+            .map(|all| cubic(all, x, y).into()),
+        5 => coefficients
+            .first_chunk()
+            .and_then(|all| fifth_degree(all, x, y)),
+        7 => coefficients
+            .first_chunk()
+            .and_then(|all| seventh_degree(all, x, y)),
         _ => None,
     };
     found.unwrap_or_else(|| row_by_row(coefficients, degree, x, y))

@@ -84,7 +84,11 @@ pub(crate) fn sample_moving(
     let mut maps = [[Dual::from(0.0); 2]; 2];
     // Odd numbers are central.
     let count = 2 - (record.encoding() & 1) as usize;
-    for (map, header) in maps.iter_mut().zip([table.direction, table.offset]).take(count) {
+    for (map, header) in maps
+        .iter_mut()
+        .zip([table.direction, table.offset])
+        .take(count)
+    {
         *map = table.map_moving(Map::read(header), record, pixel)?;
     }
     let [s, n] = maps;
@@ -333,7 +337,10 @@ fn row_of_words(row: &[f32; 4], weights: Weights) -> (i32, i32) {
     let Weights(first, second) = weights;
     (
         low(first) * low(a) + high(first) * low(b) + low(second) * low(c) + high(second) * low(d),
-        low(first) * high(a) + high(first) * high(b) + low(second) * high(c) + high(second) * high(d),
+        low(first) * high(a)
+            + high(first) * high(b)
+            + low(second) * high(c)
+            + high(second) * high(d),
     )
 }
 

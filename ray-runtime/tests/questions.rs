@@ -40,9 +40,9 @@ fn every_pixel_has_its_direction(form: Form) {
             let expected = Vector3::new(s1, s2, 1.0 - (s1 * s1 + s2 * s2) / 4.0);
             let ray = blob.lookup(0, PixelPoint::new(u, v)).unwrap();
             // |s| is below 0.8: four roundings of 6e-8. Quantized knots, which hold all of the slope
-            // along v here, are blended to 2^-16 of a cell, at most 16 px at 1/40 per px.
+            // along v here, are blended to 2^-15 of a cell: of 24 px at 1/50 per px.
             let tolerance = match form {
-                Form::Quantized => 16.0 / 40.0 / 65536.0,
+                Form::Quantized => 24.0 / 50.0 / 32768.0 + 1e-6,
                 _ => 2.5e-7,
             };
             assert!((ray.direction - expected).norm() < tolerance, "{u} {v}");
