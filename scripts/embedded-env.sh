@@ -1,5 +1,6 @@
 # Sourced by the other scripts: finds a toolchain for bare-metal Arm and says what it found.
 #
+#   embedded_available TARGET...   prints those of the targets for which there is a toolchain, and says which are left out
 #   embedded_env TARGET...   sets EMBEDDED_CARGO and exports what a build for these targets needs; returns 1 with the
 #                            remedy on standard error if there is no toolchain
 #
@@ -11,9 +12,10 @@
 repository=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 embedded_target_dir=$repository/target/embedded
 
-# What an outer cargo, clippy or rustup leaves in the environment would otherwise reach the inner build.
+# What an outer cargo, clippy or rustup leaves in the environment would otherwise reach the inner build; incremental compilation
+# would even split the images into units of other code, so that their counts would depend on it.
 unset RUSTC RUSTDOC RUSTFLAGS CARGO_ENCODED_RUSTFLAGS RUSTC_WRAPPER RUSTC_WORKSPACE_WRAPPER RUSTC_BOOTSTRAP \
-  CARGO CARGO_BUILD_TARGET CARGO_BUILD_RUSTFLAGS
+  CARGO CARGO_BUILD_TARGET CARGO_BUILD_RUSTFLAGS CARGO_INCREMENTAL
 export CARGO_TARGET_DIR=$embedded_target_dir
 
 embedded_has_rustup_target() {
@@ -52,6 +54,18 @@ embedded_debian_release() {
   esac
 }
 
+embedded_available() {
+  local target debian=0
+  if embedded_debian_release >/dev/null && embedded_find_linker >/dev/null; then debian=1; fi
+  for target in "$@"; do
+    if [ $debian = 1 ] || embedded_has_rustup_target "$target"; then
+      echo "$target"
+    else
+      echo "embedded: left out, as there is no toolchain for it: $target (rustup target add $target)" >&2
+    fi
+  done
+}
+
 embedded_no_toolchain() {
   cat >&2 <<END
 embedded: no toolchain for $*. Install one of
@@ -80,7 +94,7 @@ embedded_env() {
   "$repository/scripts/mk-sysroot.sh" "$sysroot" "$@" || return 1
   for target in "$@"; do
     local name=${target^^}
-    name=${name//-/_}
+    name=${name//[-.]/_}
     export "CARGO_TARGET_${name}_LINKER=$linker" "CARGO_TARGET_${name}_RUSTFLAGS=--sysroot=$sysroot"
   done
   echo "embedded: Debian's rustc $release, linker $linker" >&2

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs what the Cortex-M image needs and this machine lacks: QEMU, and a toolchain for bare-metal Arm. Says what it
-# does, and does nothing when all is there. On Debian through apt-get, as root or with sudo; elsewhere it tries
+# Installs what the Cortex-M images need and this machine lacks: QEMU, a toolchain for bare-metal Arm, and a C compiler for
+# it without a C library (the example of ray-runtime/c needs none). Says what it does, and does nothing when all is there. On Debian through apt-get, as root or with sudo; elsewhere it tries
 # `rustup target add` for the toolchain and names the packages for the rest.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/embedded-env.sh"
@@ -14,12 +14,13 @@ has_toolchain() {
 
 packages=()
 command -v qemu-system-arm >/dev/null || packages+=(qemu-system-arm)
+command -v arm-none-eabi-gcc >/dev/null || packages+=(gcc-arm-none-eabi)
 if ! has_toolchain; then
   # The four belong together: compiler and sources must be of one release, so those already there are brought along.
   packages+=(rustc-web cargo-web rust-web-src lld)
 fi
 if [ ${#packages[@]} = 0 ]; then
-  echo "install-embedded: QEMU and a bare-metal toolchain are there already"
+  echo "install-embedded: QEMU, a bare-metal toolchain and a C compiler for it are there already"
   exit 0
 fi
 
@@ -41,6 +42,10 @@ missing=0
 if ! command -v qemu-system-arm >/dev/null; then
   echo "install-embedded: QEMU for Arm is missing: install the package that holds qemu-system-arm" >&2
   missing=1
+fi
+if ! command -v arm-none-eabi-gcc >/dev/null; then
+  # One test does without it and says so.
+  echo "install-embedded: no C compiler for bare-metal Arm: install the package that holds arm-none-eabi-gcc" >&2
 fi
 if ! has_toolchain; then
   embedded_no_toolchain "${targets[@]}"

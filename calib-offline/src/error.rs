@@ -9,6 +9,7 @@ use crate::detect::overlay::OverlayError;
 use crate::detect::ring_target::TargetError;
 use crate::detect::suspicion::LabelSuspicion;
 use crate::experiments::ExperimentError;
+use crate::export::ExportError;
 use crate::init::InitError;
 use crate::joint::EstimateError;
 use crate::matches::MatchesError;
@@ -87,6 +88,9 @@ pub enum Error {
     /// A rig that was to be packed.
     #[error("the calibration cannot be packed")]
     Pack(#[from] PackError),
+    /// A blob that was to be written in another form.
+    #[error("the blob cannot be exported")]
+    Export(#[from] ExportError),
     /// A result that JSON cannot say.
     #[error("the result cannot be written as JSON")]
     Json(#[from] serde_json::Error),
@@ -250,6 +254,7 @@ impl Error {
             | Self::Blob(_)
             | Self::Matches(_)
             | Self::Pack(_)
+            | Self::Export(_)
             | Self::Demo(_)
             | Self::Experiment(_)
             | Self::Json(_)
@@ -302,6 +307,7 @@ impl Error {
             Self::Blob(error) => error.remedy(),
             Self::Matches(error) => error.remedy(),
             Self::Pack(error) => Some(pack_remedy(error)),
+            Self::Export(error) => Some(error.remedy()),
             Self::Write(error) => error.remedy(),
             Self::Usage(error) => error.remedy(),
         }

@@ -12,6 +12,7 @@ pub mod detect;
 pub mod error;
 pub mod evaluate;
 pub mod experiments;
+pub mod export;
 pub mod field;
 pub mod geometry;
 pub mod in_order;

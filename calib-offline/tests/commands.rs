@@ -346,7 +346,7 @@ fn pack_holds_the_bound_it_states() {
             "--json",
         ];
         let object = run(path, &arguments).assert_code(0).json();
-        assert_eq!(object["schema"], "calib-offline/pack/1");
+        assert_eq!(object["schema"], "calib-offline/pack/2");
         assert!(object["worst_error_px"].as_f64().unwrap() <= bound.parse().unwrap());
         let bytes = fs::read(path.join("r.rays")).unwrap().len();
         assert_eq!(object["bytes"], bytes);

@@ -11,7 +11,7 @@ const LAYERS: [&[&str]; 10] = [
     &["adjust"],
     &["init"],
     &["joint", "pinhole", "alternating"],
-    &["evaluate", "matches", "pack", "report"],
+    &["evaluate", "export", "matches", "pack", "report"],
     &["error"],
     &["pipeline", "demo", "compare", "experiments"],
     &["cli"],

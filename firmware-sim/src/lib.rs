@@ -7,6 +7,8 @@ pub mod counting;
 pub mod frame;
 pub mod port;
 pub mod protocol;
+pub mod random;
+pub mod same_bits;
 pub mod session;
 pub mod yardstick;
 

@@ -208,11 +208,25 @@ pub fn build_image(image: &str) -> Result<PathBuf, QemuError> {
     Ok(image_path(image))
 }
 
+/// Builds the image of this name for processors without a floating-point unit, and returns where it
+/// is: the same image, whose arithmetic is the compiler's own.
+///
+/// # Errors
+/// As [`build_image`].
+pub fn build_soft_float_image(image: &str) -> Result<PathBuf, QemuError> {
+    build(&[image], &["--target", SOFT_FLOAT_TARGET])?;
+    Ok(image_of(SOFT_FLOAT_TARGET, image))
+}
+
 /// Builds the images of these names if they are missing or stale, in one go.
 ///
 /// # Errors
 /// As [`build_image`].
 pub fn build_images(images: &[&str]) -> Result<(), QemuError> {
+    build(images, &[])
+}
+
+fn build(images: &[&str], target: &[&str]) -> Result<(), QemuError> {
     let root = root();
     let script = root.join("scripts/embedded-cargo.sh");
     if !script.is_file() {
@@ -222,6 +236,7 @@ pub fn build_images(images: &[&str]) -> Result<(), QemuError> {
     }
     let status = Command::new(&script)
         .args(["build", "--quiet", "--locked", "--release"])
+        .args(target)
         .args(images.iter().flat_map(|image| ["--bin", image]))
         .stdin(Stdio::null())
         .stdout(std::io::stderr())
@@ -241,10 +256,17 @@ pub fn build_images(images: &[&str]) -> Result<(), QemuError> {
 
 /// Where the image of this name is once it has been built; it may be stale.
 pub fn image_path(image: &str) -> PathBuf {
-    root()
-        .join("target/embedded/thumbv7em-none-eabihf/release")
-        .join(image)
+    image_of(TARGET, image)
 }
+
+fn image_of(target: &str, image: &str) -> PathBuf {
+    let folder = root().join("target/embedded").join(target);
+    folder.join("release").join(image)
+}
+
+/// The target of images, set in `cortex-m/.cargo/config.toml`.
+const TARGET: &str = "thumbv7em-none-eabihf";
+const SOFT_FLOAT_TARGET: &str = "thumbv7em-none-eabi";
 
 /// The workspace's folder.
 pub(crate) fn root() -> &'static Path {

@@ -298,11 +298,11 @@ impl<'a> RayBlob<'a> {
         })
     }
 
-    const fn views(&self) -> &Views<'a> {
-        &self.views
+    pub(crate) const fn views(&self) -> Views<'a> {
+        self.views
     }
 
-    fn record(&self, camera: usize) -> Result<Record<'a>, LookupError> {
+    pub(crate) fn record(&self, camera: usize) -> Result<Record<'a>, LookupError> {
         self.records
             .get(camera)
             .map(Record)
@@ -339,7 +339,7 @@ impl<'a> RayBlob<'a> {
                 return Err(OpenError::BadMeta);
             }
             let check = CameraCheck {
-                views: *self.views(),
+                views: self.views(),
                 camera: camera as u16,
                 record: Record(words),
                 version,

@@ -190,6 +190,65 @@ impl MeasureError {
     }
 }
 
+/// Why a point has no pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ProjectError {
+    /// No pixel of the camera's calibrated area was found to see the point.
+    Unseen,
+    /// The blob has no such camera.
+    NoSuchCamera {
+        /// The index asked for.
+        camera: usize,
+        /// How many cameras there are.
+        count: usize,
+    },
+}
+
+impl ProjectError {
+    /// The stable number of the error; one is that of [`LookupError`].
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::NoSuchCamera { .. } => 65,
+            Self::Unseen => 69,
+        }
+    }
+}
+
+impl From<LookupError> for ProjectError {
+    fn from(error: LookupError) -> Self {
+        match error {
+            LookupError::Outside => Self::Unseen,
+            LookupError::NoSuchCamera { camera, count } => Self::NoSuchCamera { camera, count },
+        }
+    }
+}
+
+/// Why what a sensor delivers cannot be mapped to the pixels of the calibration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ReadoutError {
+    /// The camera was calibrated on a sensor of another size. Nothing is ever scaled.
+    WrongSensor {
+        /// Columns and rows of the calibrated one.
+        calibrated: [u32; 2],
+        /// Columns and rows of this one.
+        found: [u32; 2],
+    },
+    /// Nothing is read, or something beyond the sensor's edge, or a binning is zero.
+    NotOnSensor,
+}
+
+impl ReadoutError {
+    /// The stable number of the error.
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::WrongSensor { .. } => 70,
+            Self::NotOnSensor => 71,
+        }
+    }
+}
+
 /// Text for people, and the trait that error chains ask for; neither is linked unless used.
 macro_rules! impl_display {
     ($($error:ty),*) => {$(
@@ -203,7 +262,13 @@ macro_rules! impl_display {
     )*};
 }
 
-impl_display!(OpenError, LookupError, MeasureError);
+impl_display!(
+    OpenError,
+    LookupError,
+    MeasureError,
+    ProjectError,
+    ReadoutError
+);
 
 #[cfg(test)]
 mod tests {
@@ -262,5 +327,16 @@ mod tests {
             MeasureError::Behind,
         ];
         assert!(measure.iter().map(|e| e.code()).eq(64..=68));
+        assert_eq!(ProjectError::Unseen.code(), 69);
+        let no_camera = LookupError::NoSuchCamera {
+            camera: 2,
+            count: 2,
+        };
+        assert_eq!(ProjectError::from(no_camera).code(), no_camera.code());
+        let wrong = ReadoutError::WrongSensor {
+            calibrated: [1, 1],
+            found: [2, 2],
+        };
+        assert_eq!([wrong.code(), ReadoutError::NotOnSensor.code()], [70, 71]);
     }
 }

@@ -7,7 +7,6 @@ use crate::format::Axis;
 // Cells are at least one (checked when a blob is opened), so that one less does not wrap.
 
 /// A place along one axis of a control grid.
-#[cfg(feature = "old-versions")]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Place {
     /// First of the four knots.
@@ -25,13 +24,35 @@ impl Axis {
         (coordinate_px - self.min_px).to_bits() <= (self.max_px - self.min_px).to_bits()
     }
 
+    /// The region's extent, px.
+    pub(crate) fn extent_px(&self) -> f32 {
+        self.max_px - self.min_px
+    }
+
+    /// The coordinate at a share of the extent.
+    pub(crate) fn at_share(&self, share: f32) -> f32 {
+        self.min_px + share * self.extent_px()
+    }
+
+    /// The nearest coordinate that the axis contains; the middle for what is not a number.
+    pub(crate) fn clamped(&self, coordinate_px: f32) -> f32 {
+        if coordinate_px > self.max_px {
+            self.max_px
+        } else if coordinate_px < self.min_px {
+            self.min_px
+        } else if coordinate_px.is_nan() {
+            self.at_share(0.5)
+        } else {
+            coordinate_px
+        }
+    }
+
     /// The mask's cell at a coordinate that the axis contains.
     pub(crate) fn mask_cell(&self, coordinate_px: f32, mask_cells: u32) -> usize {
         let cell = ((coordinate_px - self.min_px) * self.mask_cells_per_px) as u32;
         cell.min(mask_cells.wrapping_sub(1)) as usize
     }
 
-    #[cfg(feature = "old-versions")]
     /// The grid's cell and the weights at a coordinate that the axis contains.
     pub(crate) fn place(&self, coordinate_px: f32, cells: u32) -> Place {
         let (cell, t) = self.cell_and_fraction(coordinate_px, cells);
@@ -55,7 +76,6 @@ impl Axis {
         (cell as usize, share)
     }
 
-    #[cfg(feature = "old-versions")]
     /// Derivatives of a place's weights by the coordinate, 1/px.
     pub(crate) fn slopes(&self, coordinate_px: f32, cells: u32) -> [f32; 3] {
         let (_, t) = self.cell_and_fraction(coordinate_px, cells);
@@ -63,7 +83,6 @@ impl Axis {
         [-0.5 * (r * r), r * (2.0 - 1.5 * r), 0.5 * (t * t)].map(|slope| slope * self.cells_per_px)
     }
 
-    #[cfg(feature = "old-versions")]
     /// The cell of a coordinate and its place in it, 0 to 1.
     ///
     /// The fraction is taken from the distance to the cell's first edge, in two steps of which the
@@ -78,19 +97,16 @@ impl Axis {
     }
 }
 
-#[cfg(feature = "old-versions")]
 const SIXTH: f32 = 1.0 / 6.0;
-#[cfg(feature = "old-versions")]
 const TWO_THIRDS: f32 = 2.0 / 3.0;
 
-#[cfg(feature = "old-versions")]
 /// What knots 0, 2 and 3 make of their differences to knot 1: with the slopes of the weights, the
 /// derivative of the mean.
 pub(crate) fn blend_slopes(weights: [f32; 3], [a, b, c, d]: [f32; 4]) -> f32 {
     weights[0] * (a - b) + weights[1] * (c - b) + weights[2] * (d - b)
 }
 
-#[cfg(all(test, feature = "old-versions"))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -1,6 +1,10 @@
 #![doc = include_str!("../README.md")]
 #![no_std]
 #![forbid(unsafe_code)]
+#![allow(
+    clippy::inline_always,
+    reason = "on the hot path only, each counted by `firmware-sim cost`"
+)]
 
 #[cfg(target_endian = "big")]
 compile_error!("a blob is read in place and holds little-endian numbers");
@@ -13,21 +17,26 @@ mod check;
 mod error;
 pub mod format;
 mod grid;
+mod knots;
 mod lookup;
 mod polynomial;
+mod project;
 mod quantized;
 mod ray;
 mod self_test;
-#[cfg(feature = "old-versions")]
+mod sensor_window;
 mod spline;
 mod triangulate;
 mod uncertainty;
+mod weights;
 
 pub use aligned::Aligned;
 pub use blob::RayBlob;
 pub use camera::{Camera, Region, RigFromCamera};
-pub use error::{LookupError, MeasureError, OpenError, Table};
+pub use error::{LookupError, MeasureError, OpenError, ProjectError, ReadoutError, Table};
+pub use project::{EpipolarCurve, EpipolarPoint};
 pub use ray::{PixelPoint, Ray};
 pub use self_test::{SelfTestFailure, SelfTests};
+pub use sensor_window::{Readout, SensorWindow};
 pub use triangulate::{MIN_PARALLAX_SIN, Triangulation, triangulate_pair};
 pub use uncertainty::{Measurement, PointCovariance};

@@ -1,9 +1,8 @@
 //! A pixel's ray from a camera's table.
 
-use crate::format::{Encoding, Form, Record};
+use crate::format::{Encoding, Form, OLDEST_VERSION, Record};
 use crate::polynomial::{self, Dual, Number};
 use crate::quantized;
-#[cfg(feature = "old-versions")]
 use crate::spline;
 use crate::{LookupError, PixelPoint, Ray};
 use nalgebra::Vector3;
@@ -29,7 +28,6 @@ pub(crate) trait Evaluated: Number {
     /// A coordinate that grows with v at a rate, 1/px.
     fn along_v(value: f32, per_px: f32) -> Self;
     /// The spline of f32 knots at the window.
-    #[cfg(feature = "old-versions")]
     fn blend(window: &spline::Window<'_>, knots: spline::Knots<'_>) -> Option<[Self; 2]>;
 }
 
@@ -42,7 +40,6 @@ impl Evaluated for f32 {
         value
     }
 
-    #[cfg(feature = "old-versions")]
     #[inline(always)]
     fn blend(window: &spline::Window<'_>, knots: spline::Knots<'_>) -> Option<[Self; 2]> {
         window.blend(knots)
@@ -66,7 +63,6 @@ impl Evaluated for Dual {
         }
     }
 
-    #[cfg(feature = "old-versions")]
     fn blend(window: &spline::Window<'_>, knots: spline::Knots<'_>) -> Option<[Self; 2]> {
         window.blend_moving(knots)
     }
@@ -74,9 +70,7 @@ impl Evaluated for Dual {
 
 const CENTRAL_PATCHES: u32 = number(Form::Patches, true);
 const NON_CENTRAL_PATCHES: u32 = number(Form::Patches, false);
-#[cfg(feature = "old-versions")]
-pub(crate) const CENTRAL_SPLINE: u32 = number(Form::Spline, true);
-#[cfg(feature = "old-versions")]
+const CENTRAL_SPLINE: u32 = number(Form::Spline, true);
 const NON_CENTRAL_SPLINE: u32 = number(Form::Spline, false);
 
 const fn number(form: Form, is_central: bool) -> u32 {
@@ -128,8 +122,7 @@ impl Views<'_> {
                 let [s, n] = self.patch(record, pixel)?;
                 Sample { s, n }
             }
-            #[cfg(feature = "old-versions")]
-            CENTRAL_SPLINE | NON_CENTRAL_SPLINE => {
+            _ if is_spline(record) => {
                 spline::sample(self.pairs, record, pixel).ok_or(LookupError::Outside)?
             }
             _ => quantized::sample_moving(self.pairs, record, pixel).ok_or(LookupError::Outside)?,
@@ -181,15 +174,20 @@ fn lookup_other(
     record: Record<'_>,
     pixel: PixelPoint,
 ) -> Result<Ray, LookupError> {
-    #[cfg(feature = "old-versions")]
-    if matches!(record.encoding(), CENTRAL_SPLINE | NON_CENTRAL_SPLINE) {
+    if is_spline(record) {
         return lookup_spline(pairs, record, pixel);
     }
     quantized::lookup(pairs, record, from_edge(record, pixel))
 }
 
-/// The same of the form of old versions.
-#[cfg(feature = "old-versions")]
+/// Whether a table is of the form of old versions; never, so that nothing of it is linked, where they
+/// are not read.
+#[inline(always)]
+fn is_spline(record: Record<'_>) -> bool {
+    OLDEST_VERSION < 3 && matches!(record.encoding(), CENTRAL_SPLINE | NON_CENTRAL_SPLINE)
+}
+
+/// The ray from such a table.
 #[inline(never)]
 fn lookup_spline(
     pairs: &[[f32; 2]],
@@ -218,8 +216,7 @@ impl MovingRay {
 /// The ray of a sample of a camera's table, rig frame.
 #[inline(always)]
 fn ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
-    // Odd numbers are central.
-    if record.encoding() & 1 == 1 {
+    if record.is_central() {
         central_ray(record, sample.s)
     } else {
         shifted_ray(record, sample)

@@ -3,7 +3,7 @@
 use crate::PixelPoint;
 use crate::format::Record;
 use crate::grid::{Place, blend_slopes};
-use crate::lookup::{CENTRAL_SPLINE, Evaluated, Sample};
+use crate::lookup::{Evaluated, Sample};
 use crate::polynomial::Dual;
 
 /// The sample of a table of f32 knots. `None` cannot happen in a blob that was opened: the size of
@@ -14,7 +14,7 @@ pub(crate) fn sample<T: Evaluated>(
     record: Record<'_>,
     pixel: PixelPoint,
 ) -> Option<Sample<T>> {
-    let is_central = record.encoding() == CENTRAL_SPLINE;
+    let is_central = record.is_central();
     let knots = |channels: usize| {
         let first = (record.grid_offset() >> 3) as usize + channels;
         Some(Knots {

@@ -39,13 +39,10 @@ fn every_pixel_has_its_direction(form: Form) {
             let [s1, s2] = camera.s(u, v);
             let expected = Vector3::new(s1, s2, 1.0 - (s1 * s1 + s2 * s2) / 4.0);
             let ray = blob.lookup(0, PixelPoint::new(u, v)).unwrap();
-            // |s| is below 0.8: four roundings of 6e-8. Quantized knots, which hold all of the slope
-            // along v here, are blended to 2^-15 of a cell: of 24 px at 1/50 per px.
-            let tolerance = match form {
-                Form::Quantized => 24.0 / 50.0 / 32768.0 + 1e-6,
-                _ => 2.5e-7,
-            };
-            assert!((ray.direction - expected).norm() < tolerance, "{u} {v}");
+            assert!(
+                (ray.direction - expected).norm() < camera.round_off(),
+                "{u} {v}"
+            );
             assert_eq!(ray.origin_mm, Vector3::zeros());
         }
     }
@@ -66,12 +63,7 @@ fn an_offset_moves_the_ray(form: Form) {
     assert!(!blob.camera(0).unwrap().encoding.is_central);
 
     let center = blob.lookup(0, PixelPoint::new(31.5, 23.5)).unwrap();
-    // Knots of 0.25 mm a step are blended to four times 2^-14 of a step.
-    let tolerance = match form {
-        Form::Quantized => 7e-5,
-        _ => 1e-5,
-    };
-    assert!((center.origin_mm - Vector3::new(97.0, 4.0, 0.0)).norm() < tolerance);
+    assert!((center.origin_mm - Vector3::new(97.0, 4.0, 0.0)).norm() < 1e-5);
     assert!((center.direction + Vector3::z()).norm() < 1e-6);
 
     for (u, v) in [(0.0, 0.0), (63.0, 10.0), (20.25, 47.0)] {
@@ -80,7 +72,7 @@ fn an_offset_moves_the_ray(form: Form) {
         let [s1, s2] = camera.s(u, v);
         // The grid holds m / (1 + s.s/4), so |m| is 5 times that; and it is across the ray.
         let length = 5.0 * (1.0 + (s1 * s1 + s2 * s2) / 4.0);
-        assert!((offset.norm() - length).abs() < tolerance + 1e-5);
+        assert!((offset.norm() - length).abs() < 2e-5);
         assert!(offset.dot(&ray.direction).abs() < 2e-5 * ray.direction.norm());
     }
 }

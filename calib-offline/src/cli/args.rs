@@ -1,6 +1,6 @@
 //! What can be written on the command line. Each help text starts with an example.
 
-use super::{calibrate, compare, demo, detect, evaluate, inspect, measure, pack, simulate};
+use super::{calibrate, compare, demo, detect, evaluate, export, inspect, measure, pack, simulate};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::num::NonZeroUsize;
 
@@ -50,6 +50,8 @@ pub enum Verb {
     Detect(detect::DetectArgs),
     /// Run the publication's experiments with three methods: figures, tables, evaluation.json
     Evaluate(evaluate::EvaluateArgs),
+    /// Write a blob as Intel HEX, UF2, raw bytes or a C array
+    Export(export::ExportArgs),
     /// Say what a dataset, a calibration or a blob is
     Inspect(inspect::InspectArgs),
     /// Triangulate matches

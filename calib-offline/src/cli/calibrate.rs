@@ -35,8 +35,9 @@ half_data_ratio (points of two calibrations from half of the poses: RMS differen
 predicted), central_model_mm (RMS by which a central model would move points; 0 for a central rig),
 rms_px, sigma_px, cameras (name, sensor_px, covered_share, views, central, centrality_rms_mm,
 offset_numbers: used and all), baseline_mm, working_distance_mm, counts of poses, views and corners,
-left_out, blob (bytes, max_error_px, wanted_error_px: larger than wanted only where f32 cannot say it
-better), calibration, rig, report (the three files). A figure that does not apply is null.";
+left_out, blob (bytes; max_error_px, and max_error_mm at the working distance; wanted_error_px: the error
+is larger than wanted only where f32 cannot say it better; curve: bytes of all tables, error_px, error_mm of
+other sizes), calibration, rig, report (the three files). A figure that does not apply is null.";
 
 /// The blob's bound unless `pack` is asked for another, px: well below the noise of any corner.
 pub const BLOB_MAX_ERROR_PX: f64 = 0.001;
@@ -129,7 +130,7 @@ pub fn run(
     let object = CalibrateObject {
         schema: "calib-offline/calibrate/1",
         facts: Facts::of(&written.calibration),
-        blob: written.blob,
+        blob: written.blob.clone(),
         calibration,
         rig,
         report,
@@ -195,11 +196,7 @@ pub fn write_results(
     );
     console.progress().end();
     let packed = packed?;
-    let blob = BlobFacts {
-        bytes: packed.bytes.len(),
-        max_error_px: packed.worst_error_px,
-        wanted_error_px: BLOB_MAX_ERROR_PX,
-    };
+    let blob = BlobFacts::new(&packed, BLOB_MAX_ERROR_PX);
     if let Some(warning) = blob.warning() {
         console.warn(&warning);
     }

@@ -2,6 +2,7 @@
 
 use super::Outcome;
 use super::output::Console;
+use super::pack::form_name;
 use super::rig_file::{RigFile, open};
 use crate::dataset::split::without_excluded;
 use crate::dataset::{Dataset, load_corners};
@@ -31,7 +32,7 @@ With --json: schema calib-offline/inspect/1 and kind, which is
                warnings; null before detect)
   calibration  tool_version, method, input_sha256, and the facts that calibrate prints
   blob         bytes, identity, frame, written_by, max_error_px, working_distance_mm, self_tests,
-               cameras (name, sensor_px, region_px, cells, central, position_mm),
+               cameras (name, sensor_px, region_px, cells, form, central, position_mm),
                pairs whose uncertainty it carries (cameras, nodes, bytes, noise_px)";
 
 /// The arguments.
@@ -108,6 +109,7 @@ struct BlobCamera {
     /// First column, first row, columns, rows.
     region_px: [u32; 4],
     cells: [u32; 2],
+    form: &'static str,
     central: bool,
     position_mm: [f32; 3],
 }
@@ -292,6 +294,7 @@ fn blob_object(blob: &RayBlob<'_>) -> BlobObject {
                     camera.region.height,
                 ],
                 cells: camera.cells,
+                form: form_name(camera.encoding.form),
                 central: camera.encoding.is_central,
                 position_mm: camera.rig_from_camera.translation_mm.into(),
             })
@@ -328,8 +331,9 @@ fn blob_words(object: &BlobObject) -> String {
         // Writing to a String cannot fail.
         let _ = writeln!(
             words,
-            "camera          {}, {width} x {height} px, {} x {} cells, {}, at ({x:.2}, {y:.2}, {z:.2}) mm",
+            "camera          {}, {width} x {height} px, {}, {} x {} cells, {}, at ({x:.2}, {y:.2}, {z:.2}) mm",
             camera.name,
+            camera.form,
             camera.cells[0],
             camera.cells[1],
             if camera.central {

@@ -10,6 +10,7 @@ pub mod demo;
 pub mod detect;
 pub mod detect_target;
 pub mod evaluate;
+pub mod export;
 mod failure;
 pub mod inspect;
 pub mod measure;
@@ -65,6 +66,7 @@ fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
         Verb::Demo(args) => demo::run(args, console),
         Verb::Detect(args) => recording::detect(args, console),
         Verb::Evaluate(args) => evaluate::run(args, console),
+        Verb::Export(args) => export::run(args, console),
         Verb::Inspect(args) => inspect::run(args, console),
         Verb::Measure(args) => measure::run(args, console),
         Verb::Pack(args) => pack::run(args, console),

@@ -83,7 +83,7 @@ struct PackObject<'a> {
     worst_error_mm: f64,
     cameras: Vec<PackedCamera>,
     pairs: Vec<PairObject>,
-    curve: Vec<CurveObject>,
+    curve: Vec<CurvePoint>,
 }
 
 #[derive(Debug, Serialize)]
@@ -95,13 +95,6 @@ struct PackedCamera {
     bytes: usize,
     worst_error_px: f64,
     worst_error_mm: f64,
-}
-
-#[derive(Debug, Serialize)]
-struct CurveObject {
-    bytes: usize,
-    error_px: f64,
-    error_mm: f64,
 }
 
 #[derive(Debug, Serialize)]
@@ -178,7 +171,7 @@ pub fn run(args: &PackArgs, console: &Console) -> Result<Outcome, Error> {
                 calibration_sigma_error: pair.calibration_sigma_error,
             })
             .collect(),
-        curve: packed.curve.into_iter().map(CurveObject::from).collect(),
+        curve: packed.curve,
     };
     let uncertainty: String = object.pairs.iter().map(pair_words).collect();
     let asked = match (args.max_error_px, args.max_bytes) {
@@ -203,16 +196,6 @@ pub(super) const fn form_name(form: Form) -> &'static str {
         Form::Spline => "spline",
         Form::Patches => "patches",
         Form::Quantized => "quantized",
-    }
-}
-
-impl From<CurvePoint> for CurveObject {
-    fn from(point: CurvePoint) -> Self {
-        Self {
-            bytes: point.bytes,
-            error_px: point.error_px,
-            error_mm: point.error_mm,
-        }
     }
 }
 

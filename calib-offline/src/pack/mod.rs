@@ -33,6 +33,7 @@ use crate::geometry::{PixelPoint, SensorSize};
 use crate::in_order;
 use ray_runtime::format::{Encoding, IDENTITY_LEN, MAX_CELLS, MAX_EXTENT_PX};
 use ray_runtime::{OpenError, RayBlob, SelfTestFailure};
+use serde::Serialize;
 
 /// What to pack for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -142,7 +143,7 @@ pub struct Tried {
 }
 
 /// What a size of all cameras' tables together could hold.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CurvePoint {
     /// Bytes of the tables.
     pub bytes: usize,
@@ -240,7 +241,9 @@ pub enum PackError {
         cells: [u32; 2],
     },
     /// No table within the bound is small enough.
-    #[error("{max_bytes} bytes are too few: the smallest blob within {max_error_px} px has {need}")]
+    #[error(
+        "{max_bytes} bytes are too few: the smallest blob within {max_error_px:.4} px has {need}"
+    )]
     TooFewBytes {
         /// Bytes allowed.
         max_bytes: usize,

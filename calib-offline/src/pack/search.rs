@@ -115,20 +115,18 @@ pub fn choose(
             .cmp(&b.bytes)
             .then(a.error_px.total_cmp(&b.error_px))
     });
-    match best {
-        Some(table) => Ok(Choice { table, tried }),
-        None => {
-            let best = tried
-                .iter()
-                .min_by(|a, b| a.error_px.total_cmp(&b.error_px));
-            Err(PackError::BoundNotReached {
-                camera: camera.name.clone(),
-                wanted_px: settings.max_error_px,
-                best_px: best.map_or(f64::INFINITY, |tried| tried.error_px),
-                cells: best.map_or([0, 0], |tried| tried.cells),
-            })
-        }
+    if let Some(table) = best {
+        return Ok(Choice { table, tried });
     }
+    let best = tried
+        .iter()
+        .min_by(|a, b| a.error_px.total_cmp(&b.error_px));
+    Err(PackError::BoundNotReached {
+        camera: camera.name.clone(),
+        wanted_px: settings.max_error_px,
+        best_px: best.map_or(f64::INFINITY, |tried| tried.error_px),
+        cells: best.map_or([0, 0], |tried| tried.cells),
+    })
 }
 
 /// Attempts on one camera.

@@ -1,10 +1,12 @@
 //! The report page: one HTML file that needs nothing else, no network and no scripts.
 
+use super::BlobFacts;
 use super::choices_page;
 use super::facts::Facts;
 use super::left_out_page;
 use super::plot::{
-    Figure, cost, coverage, histogram, pose_rms, residual_vectors, scene, uncertainty_map,
+    Figure, blob_curve, cost, coverage, histogram, pose_rms, residual_vectors, scene,
+    uncertainty_map,
 };
 use super::procedure;
 use super::record::{Calibration, HeldOutRecord};
@@ -12,42 +14,6 @@ use super::text::short;
 use super::words;
 use crate::evaluate::half_data::HalfDataCheck;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use serde::Serialize;
-
-/// What is known of the blob that was written beside the report.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct BlobFacts {
-    /// Its size.
-    pub bytes: usize,
-    /// Largest difference of a ray from the calibration's, px.
-    pub max_error_px: f64,
-    /// What it was to be at most, px.
-    pub wanted_error_px: f64,
-}
-
-impl BlobFacts {
-    /// That the blob is worse than it was to be, if it is.
-    pub fn warning(&self) -> Option<String> {
-        (self.max_error_px > self.wanted_error_px).then(|| {
-            format!(
-                "the blob is within {} px of the calibration, not within {} px: no grid of \
-                 single-precision numbers holds that for this sensor and lens",
-                short(self.max_error_px),
-                short(self.wanted_error_px)
-            )
-        })
-    }
-
-    /// Size and error with their units.
-    pub fn in_words(&self) -> String {
-        format!(
-            "{} bytes ({} kB), within {} px of the calibration",
-            self.bytes,
-            short(self.bytes as f64 / 1000.0),
-            short(self.max_error_px)
-        )
-    }
-}
 
 /// The page as a file's content.
 pub fn page(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
@@ -71,6 +37,10 @@ pub fn page(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
                     (verdict(&facts))
                     (headline(calibration, &facts, blob))
                     (figures(calibration))
+                    @if let Some(blob) = blob {
+                        (group("Blob", blob_curve::draw(blob).as_slice(),
+                            "What the rays cost on the device: the bytes of all cameras' tables, without mask, metadata and uncertainty, against the largest error of any ray. Choose with calib-offline pack: --max-error-px or --max-bytes."))
+                    }
                     (procedure::draw(calibration))
                     (choices_page::draw(calibration))
                     (left_out_page::draw(calibration))
@@ -232,13 +202,21 @@ fn provenance(calibration: &Calibration) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pack::CurvePoint;
     use crate::report::example;
 
     fn blob() -> BlobFacts {
+        let point = |bytes, error_px| CurvePoint {
+            bytes,
+            error_px,
+            error_mm: 0.4 * error_px,
+        };
         BlobFacts {
             bytes: 48_320,
             max_error_px: 0.00042,
+            max_error_mm: 0.00017,
             wanted_error_px: 0.001,
+            curve: vec![point(160, 0.7), point(672, 0.012), point(2400, 0.0004)],
         }
     }
 
@@ -273,8 +251,8 @@ mod tests {
         ] {
             assert!(page.contains(part), "{part} is not in the page");
         }
-        assert_eq!(page.matches("<svg").count(), 11);
-        assert_eq!(page.matches("How to read this").count(), 9);
+        assert_eq!(page.matches("<svg").count(), 12);
+        assert_eq!(page.matches("How to read this").count(), 10);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! What a calibration says of itself: `calibration.json` and the report page. Computes nothing new.
 
-pub mod choices_page;
+pub mod blob_facts;
+mod choices_page;
 pub mod facts;
 pub mod html;
 pub mod left_out_page;
@@ -14,5 +15,5 @@ pub mod words;
 #[cfg(test)]
 pub(crate) mod example;
 
-pub use html::BlobFacts;
+pub use blob_facts::BlobFacts;
 pub use record::Calibration;

@@ -1,7 +1,7 @@
 //! The summary for a terminal: what stands on the page's first screen.
 
+use super::BlobFacts;
 use super::facts::Facts;
-use super::html::BlobFacts;
 use super::procedure;
 use super::record::Calibration;
 use super::words;

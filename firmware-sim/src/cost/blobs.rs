@@ -9,6 +9,7 @@ use super::CostError;
 use super::report::CameraCost;
 use crate::counting::{Job, PixelPair, job_start};
 use crate::qemu;
+use crate::random::SplitMix;
 use crate::yardstick::{BilinearTable, Brown};
 
 /// The blobs that are counted if none are given, from the workspace's folder: one a line for every
@@ -156,7 +157,12 @@ fn choose_matches(
     let mut matches = Vec::with_capacity(MATCH_COUNT);
     for _ in 0..MATCH_COUNT {
         let found = (0..TRIES_PER_MATCH)
-            .map(|_| [random.pixel_of(camera_a), random.pixel_of(camera_b)])
+            .map(|_| {
+                [
+                    pixel_of(&mut random, camera_a),
+                    pixel_of(&mut random, camera_b),
+                ]
+            })
             .find(|pair| meets(*pair));
         let [a, b] = found?;
         matches.push([a.u, a.v, b.u, b.v]);
@@ -164,28 +170,14 @@ fn choose_matches(
     Some(matches)
 }
 
-/// `SplitMix64` (Steele, Lea, Flood 2014).
-struct SplitMix(u64);
-
-impl SplitMix {
-    /// Uniform in [0, 1).
-    fn unit(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^= z >> 31;
-        (z >> 40) as f32 / (1 << 24) as f32
-    }
-
-    fn pixel_of(&mut self, camera: &Camera<'_>) -> PixelPoint {
-        let region = camera.region;
-        let mut along = |first: u32, count: u32| first as f32 - 0.5 + self.unit() * count as f32;
-        PixelPoint::new(
-            along(region.u, region.width),
-            along(region.v, region.height),
-        )
-    }
+/// Anywhere in the region.
+fn pixel_of(random: &mut SplitMix, camera: &Camera<'_>) -> PixelPoint {
+    let region = camera.region;
+    let mut along = |first: u32, count: u32| first as f32 - 0.5 + random.unit() * count as f32;
+    PixelPoint::new(
+        along(region.u, region.width),
+        along(region.v, region.height),
+    )
 }
 
 /// The blob's own rays at the nodes; zero where there are none, which costs as much to read.

@@ -5,9 +5,9 @@ use firmware_sim::protocol::{Match, Sighting};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use ray_runtime::format::{
-    ALIGNMENT, Axis, CRC_OFFSET, CameraMeta, Encoding, HEADER_LEN, Header, LengthUnit, Meta,
+    ALIGNMENT, Axis, CRC_OFFSET, CameraMeta, Encoding, Form, HEADER_LEN, Header, LengthUnit, Meta,
     NODE_LEN, PairHeader, PixelConvention, RECORD_LEN, RecordFields, VERSION, aligned, checksum,
-    grid_len, mask_len,
+    mask_len,
 };
 
 use serde::Serialize;
@@ -19,7 +19,14 @@ pub const CAMERAS: [(&str, u32, u32); 2] = [("left", 640, 480), ("right", 600, 5
 
 const CELLS: [u32; 2] = [8, 6];
 const MASK_CELLS: [u32; 2] = [16, 12];
-const ENCODINGS: [Encoding; 2] = [Encoding::CentralF32, Encoding::NonCentralF32];
+const ENCODINGS: [Encoding; 2] = [spline(true), spline(false)];
+
+const fn spline(is_central: bool) -> Encoding {
+    Encoding {
+        form: Form::Spline,
+        is_central,
+    }
+}
 
 /// The blob's bytes.
 pub fn blob() -> Vec<u8> {
@@ -104,7 +111,7 @@ fn encoded(message: &impl Serialize) -> Vec<u8> {
 /// Half-angle vectors that look about 35 degrees to each side and, between the knots, anywhere.
 fn grid(camera: usize, encoding: Encoding) -> Vec<u8> {
     let mut random = ChaCha8Rng::seed_from_u64(camera as u64);
-    let mut bytes = Vec::with_capacity(grid_len(encoding, CELLS));
+    let mut bytes = Vec::new();
     for row in 0..CELLS[1] + 3 {
         for col in 0..CELLS[0] + 3 {
             let mut from_center = |index: u32, cells: u32| {

@@ -23,7 +23,7 @@ pub struct Axis {
 impl Axis {
     /// The numbers of an axis with `extent_px` pixels from number `first_px` on.
     ///
-    /// Extents, first pixels up to [`MAX_EXTENT_PX`] and cells from 1 to [`MAX_CELLS`] give finite
+    /// Extents, first pixels up to [`MAX_EXTENT_PX`](super::MAX_EXTENT_PX) and cells from 1 to [`MAX_CELLS`](super::MAX_CELLS) give finite
     /// numbers; anything else gives some numbers.
     pub fn new(first_px: u32, extent_px: u32, cells: u32, mask_cells: u32) -> Self {
         let (first, extent, cells) = (first_px as f32, extent_px as f32, cells as f32);

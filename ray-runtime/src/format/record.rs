@@ -17,7 +17,7 @@ pub struct Record<'a>(pub &'a [u32; RECORD_WORDS]);
 /// A camera's record as the packer holds it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RecordFields {
-    /// [`Encoding::number`].
+    /// [`Encoding::number`](super::Encoding::number).
     pub encoding: u32,
     /// Cells of the control grid along u and v.
     pub cells: [u32; 2],
@@ -65,6 +65,11 @@ impl Record<'_> {
     /// Number of the encoding.
     pub const fn encoding(self) -> u32 {
         self.0[0]
+    }
+
+    /// Whether all rays start in the camera's reference point: encodings with odd numbers.
+    pub const fn is_central(self) -> bool {
+        self.encoding() & 1 == 1
     }
 
     /// Cells of the control grid along u and v.

@@ -109,6 +109,18 @@ pub fn round_up(value: f64) -> f64 {
         .unwrap_or(value)
 }
 
+/// Powers of ten, few enough to stand apart.
+pub fn decades(from: i32, to: i32) -> Vec<Tick> {
+    let every = ((to - from) / 6 + 1) as usize;
+    (from..=to)
+        .step_by(every)
+        .map(|power| Tick {
+            value: f64::from(power),
+            text: format!("1e{power}"),
+        })
+        .collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,6 +1,6 @@
 //! The cost after each accepted step of the estimate.
 
-use super::axes::{Axes, Tick, round_up, ticks};
+use super::axes::{Axes, decades, round_up, ticks};
 use super::svg::Svg;
 use super::{Figure, WIDTH};
 use crate::report::Calibration;
@@ -54,16 +54,4 @@ pub fn draw(calibration: &Calibration) -> Option<Figure> {
             calibration.estimate.stop_reason
         ),
     })
-}
-
-/// Powers of ten, few enough to stand apart.
-fn decades(from: i32, to: i32) -> Vec<Tick> {
-    let every = ((to - from) / 6 + 1) as usize;
-    (from..=to)
-        .step_by(every)
-        .map(|power| Tick {
-            value: f64::from(power),
-            text: format!("1e{power}"),
-        })
-        .collect()
 }

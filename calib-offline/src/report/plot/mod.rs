@@ -4,6 +4,7 @@
 //! dark ground. All drawings are [`WIDTH`] units wide, about what a phone shows at full size.
 
 pub mod axes;
+pub mod blob_curve;
 pub mod chart;
 pub mod cost;
 pub mod coverage;

@@ -1,0 +1,99 @@
+/* How a device uses rays.h: opens the blob at the start of a flash sector, checks itself, and measures. It prints the bits of
+ * 4000 random matches, so that targets can be compared. `print` and `flash` are the machine's: qemu.c or host.c. */
+#include "example.h"
+#include "rays.h"
+
+/* In static memory: a rig is 128 bytes. */
+static rays_rig rig;
+
+static void print_number(uint32_t number, int digits)
+{
+    char text[9];
+    for (int k = 0; k < digits; k++) {
+        text[k] = "0123456789abcdef"[number >> 4 * (digits - 1 - k) & 15];
+    }
+    text[digits] = 0;
+    print(text);
+}
+
+static void print_bits(const float *numbers, int count)
+{
+    for (int k = 0; k < count; k++) {
+        union { float number; uint32_t bits; } as;
+        as.number = numbers[k];
+        print(" ");
+        print_number(as.bits, 8);
+    }
+}
+
+/* A code in place of an answer, or 0 in front of one. */
+static void print_code(int code)
+{
+    print(" | ");
+    print_number((uint32_t)code, 2);
+}
+
+static uint32_t random_state = 1;
+
+/* Pixels of a sensor of 64 x 48 and a little around it, in steps of 2^-14 px. */
+static float random_px(int extent_px)
+{
+    random_state = random_state * 1664525u + 1013904223u;
+    return (float)(int32_t)((random_state >> 8) % (uint32_t)((extent_px + 1) << 14)) / 16384.0f - 1.0f;
+}
+
+int example(void)
+{
+    size_t length;
+    const void *sector = flash(&length);
+    uint32_t blob_len;
+    int code = rays_stated_len(sector, length, &blob_len);
+    if (code == RAYS_OK) {
+        code = rays_open(&rig, sector, blob_len <= length ? blob_len : length);
+    }
+    if (code != RAYS_OK) {
+        print("no blob: code ");
+        print_number((uint32_t)code, 2);
+        print("\n");
+        return 1;
+    }
+    size_t tests;
+    code = rays_self_test(&rig, &tests);
+    print("cameras ");
+    print_number((uint32_t)rays_camera_count(&rig), 2);
+    print(", self-tests ");
+    print_number((uint32_t)tests, 2);
+    print(code == RAYS_OK ? " passed\n" : " failed\n");
+    if (code != RAYS_OK) {
+        return 1;
+    }
+    for (int k = 0; k < 4000; k++) {
+        rays_sighting first = {0, 0, 0}, second = {1, 0, 0};
+        first.u_px = random_px(64);
+        first.v_px = random_px(48);
+        second.u_px = random_px(64);
+        second.v_px = random_px(48);
+
+        rays_ray ray;
+        rays_point point;
+        rays_measurement measurement;
+        print_code(code = rays_lookup(&rig, second, &ray));
+        if (code == RAYS_OK) {
+            print_bits(ray.origin_mm, 3);
+            print_bits(ray.direction, 3);
+        }
+        print_code(code = rays_triangulate(&rig, first, second, &point));
+        if (code == RAYS_OK) {
+            print_bits(point.point_mm, 3);
+            print_bits(&point.gap_squared_mm2, 1);
+        }
+        print_code(code = rays_triangulate_with_covariance(&rig, first, second, &measurement));
+        if (code == RAYS_OK) {
+            print_bits(measurement.point_mm, 3);
+            print_bits(&measurement.gap_squared_mm2, 1);
+            print_bits(measurement.sigma_mm, measurement.has_sigma ? 3 : 0);
+        }
+        print("\n");
+    }
+    return 0;
+}

@@ -1,0 +1,112 @@
+/* Opens a ray blob in place and answers which line in space a pixel sees, and which point two pixels see together.
+ *
+ * Nothing is allocated and nothing is copied: the blob stays where it is, in flash or in memory, at an address that is a
+ * multiple of 8, unchanged for as long as its rig is used. A rig is plain memory of the caller's, initialized by rays_open;
+ * it needs no closing, and once open it is only read, so any number of threads may use it.
+ *
+ * Pixels: the center of the sensor's top-left pixel is (0, 0), u right, v down. Lengths are millimeters, points and rays are
+ * in the rig's frame. The same blob and pixels give the same bits on every target.
+ *
+ * Functions return RAYS_OK or say why there is no answer; what they were to write to is then left as it was.
+ * Link with librays.a of your target and float ABI, and with -Wl,--gc-sections. On a Cortex-M with an FPU, switch it on
+ * (CPACR) before the first call. */
+#ifndef RAYS_H
+#define RAYS_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Codes never change their meaning; later versions may add some. */
+enum {
+    RAYS_OK = 0,
+
+    /* Why a blob does not open. */
+    RAYS_TRUNCATED = 1,        /* fewer bytes than it says it has, or than a header has */
+    RAYS_BAD_MAGIC = 2,        /* no blob */
+    RAYS_WRONG_VERSION = 3,    /* a blob of a version that this library does not read */
+    RAYS_TRAILING_BYTES = 4,   /* more bytes than it says it has: see rays_stated_len */
+    RAYS_BAD_CRC = 5,          /* damaged on the way */
+    RAYS_MISALIGNED = 6,       /* not at a multiple of 8 */
+    RAYS_BAD_HEADER = 7,       /* 7 to 13: not what FORMAT.md says, though the checksum fits */
+    RAYS_BAD_META = 8,
+    RAYS_BAD_PADDING = 9,
+    RAYS_UNKNOWN_ENCODING = 10,
+    RAYS_BAD_LAYOUT = 11,
+    RAYS_BAD_NUMBER = 12,
+    RAYS_BAD_PAIR = 13,
+
+    /* Why a question has no answer. */
+    RAYS_OUTSIDE = 64,         /* a pixel outside of its camera's calibrated area, or not a number */
+    RAYS_NO_SUCH_CAMERA = 65,
+    RAYS_PARALLEL = 67,        /* the rays are parallel within 0.0002 rad */
+    RAYS_BEHIND = 68,          /* the rays meet behind a camera */
+
+    /* Of this interface. */
+    RAYS_BAD_ARGUMENT = 128,   /* a null pointer, or a length that no object has */
+    RAYS_NOT_OPEN = 129,       /* the rig was not opened, or could not be */
+    RAYS_SELF_TEST_FAILED = 130
+};
+
+/* Memory for a rig: 128 bytes where pointers have 32 bits. What is in it is the library's business. */
+typedef struct {
+    const void *opaque[32];
+} rays_rig;
+
+/* A pixel of a camera; cameras count from 0 in the order of the blob. */
+typedef struct {
+    size_t camera;
+    float u_px;
+    float v_px;
+} rays_sighting;
+
+/* The points origin_mm + lambda * direction, lambda > 0 in front of the camera. The direction is not normalized. */
+typedef struct {
+    float origin_mm[3];
+    float direction[3];
+} rays_ray;
+
+/* The middle of the common perpendicular of two rays, and the square of its length. */
+typedef struct {
+    float point_mm[3];
+    float gap_squared_mm2;
+} rays_point;
+
+/* The same with the standard deviation along x, y and z: what the calibration leaves open and the pixels' noise.
+ * has_sigma is 0, and sigma_mm too, where the blob says nothing of the uncertainty of these two cameras. */
+typedef struct {
+    float point_mm[3];
+    float gap_squared_mm2;
+    float sigma_mm[3];
+    int has_sigma;
+} rays_measurement;
+
+/* How many of these bytes, a flash sector say, are the blob at their start. Only its first bytes are checked. */
+int rays_stated_len(const void *bytes, size_t length, uint32_t *stated_len);
+
+/* Checks the whole blob, `length` bytes and no more, and opens it in place. One pass over it. */
+int rays_open(rays_rig *rig, const void *blob, size_t length);
+
+/* 0 if the rig is not open. */
+size_t rays_camera_count(const rays_rig *rig);
+
+int rays_lookup(const rays_rig *rig, rays_sighting sighting, rays_ray *ray);
+
+int rays_triangulate(const rays_rig *rig, rays_sighting first, rays_sighting second, rays_point *point);
+
+/* About three and a half times the work of rays_triangulate, whose bits the point has. */
+int rays_triangulate_with_covariance(const rays_rig *rig, rays_sighting first, rays_sighting second,
+                                     rays_measurement *measurement);
+
+/* Whether this target computes the bits that the packing host computed. `number`, which may be null, becomes how many tests
+ * there are or, with RAYS_SELF_TEST_FAILED, the first that failed, counted from 0. */
+int rays_self_test(const rays_rig *rig, size_t *number);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

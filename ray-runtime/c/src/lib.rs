@@ -1,0 +1,311 @@
+//! The C interface of `ray-runtime`; `rays.h` is its documentation and its other half.
+//!
+//! All `unsafe` of the interface stands in this file. What C must promise is what `rays.h` says: a
+//! pointer is null or points to an object of its type, a rig is used only after [`rays_open`], and the
+//! blob stays where it is, unchanged, for as long as its rig is used.
+//!
+//! No panic is reachable in the library: [`panic`] calls a function that exists nowhere, so one that
+//! the compiler could not rule out ends the link of any program with an undefined symbol.
+
+#![no_std]
+
+use core::ffi::c_int;
+use core::mem::MaybeUninit;
+use ray_runtime::{MeasureError, OpenError, PixelPoint, RayBlob};
+
+/// Done.
+pub const OK: c_int = 0;
+/// A null pointer, or a length that no object has.
+pub const BAD_ARGUMENT: c_int = 128;
+/// The rig was never opened, or opening it failed.
+pub const NOT_OPEN: c_int = 129;
+/// A self-test gives other bits.
+pub const SELF_TEST_FAILED: c_int = 130;
+
+/// Memory for a rig, owned by the caller.
+#[repr(C)]
+pub struct Rig {
+    opaque: [MaybeUninit<*const ()>; 32],
+}
+
+/// What lies in a [`Rig`].
+struct Opened {
+    /// [`OPEN`] or 0.
+    state: u32,
+    blob: MaybeUninit<RayBlob<'static>>,
+}
+
+/// "RAYS".
+const OPEN: u32 = 0x5359_4152;
+
+const _: () = assert!(
+    size_of::<Opened>() <= size_of::<Rig>() && align_of::<Opened>() <= align_of::<Rig>(),
+    "an opened blob does not fit into a rays_rig: enlarge it here and in rays.h"
+);
+
+/// A pixel of a camera.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct Sighting {
+    camera: usize,
+    u_px: f32,
+    v_px: f32,
+}
+
+/// A ray, rig frame.
+#[repr(C)]
+pub struct Ray {
+    origin_mm: [f32; 3],
+    direction: [f32; 3],
+}
+
+/// A triangulated point, rig frame.
+#[repr(C)]
+pub struct Point {
+    point_mm: [f32; 3],
+    gap_squared_mm2: f32,
+}
+
+/// A triangulated point with its standard deviations, rig frame.
+#[repr(C)]
+pub struct Measurement {
+    point_mm: [f32; 3],
+    gap_squared_mm2: f32,
+    sigma_mm: [f32; 3],
+    has_sigma: c_int,
+}
+
+/// How long the blob at the start of `bytes` says it is.
+///
+/// # Safety
+/// As `rays.h` says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rays_stated_len(
+    bytes: *const u8,
+    length: usize,
+    stated_len: *mut u32,
+) -> c_int {
+    // SAFETY: null or as many bytes as stated, says the caller.
+    let (Some(bytes), false) = (unsafe { slice(bytes, length) }, stated_len.is_null()) else {
+        return BAD_ARGUMENT;
+    };
+    match RayBlob::stated_len(bytes) {
+        Ok(stated) => {
+            // SAFETY: not null, hence a u32.
+            unsafe { stated_len.write(stated) };
+            OK
+        }
+        Err(error) => error.code().into(),
+    }
+}
+
+/// Checks a blob and opens it in place.
+///
+/// # Safety
+/// As `rays.h` says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rays_open(rig: *mut Rig, blob: *const u8, length: usize) -> c_int {
+    if rig.is_null() {
+        return BAD_ARGUMENT;
+    }
+    // SAFETY: not null, hence memory for a rig, which an `Opened` fits into (asserted above).
+    // Nobody else uses it meanwhile.
+    let opened = unsafe { &mut *rig.cast::<MaybeUninit<Opened>>() };
+    let opened = opened.write(Opened {
+        state: 0,
+        blob: MaybeUninit::uninit(),
+    });
+    // SAFETY: null or as many bytes as stated, says the caller; they live for as long as the rig is
+    // used, which is all that 'static stands for here.
+    let Some(bytes) = (unsafe { slice(blob, length) }) else {
+        return BAD_ARGUMENT;
+    };
+    match RayBlob::open(bytes) {
+        Ok(blob) => {
+            opened.blob.write(blob);
+            opened.state = OPEN;
+            OK
+        }
+        Err(error) => OpenError::code(error).into(),
+    }
+}
+
+/// How many cameras there are; 0 if the rig is not open.
+///
+/// # Safety
+/// As `rays.h` says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rays_camera_count(rig: *const Rig) -> usize {
+    // SAFETY: null or a rig that went through `rays_open`, says the caller.
+    unsafe { blob(rig) }.map_or(0, |blob| blob.camera_count())
+}
+
+/// The ray of a pixel.
+///
+/// # Safety
+/// As `rays.h` says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rays_lookup(rig: *const Rig, sighting: Sighting, ray: *mut Ray) -> c_int {
+    let ask = |blob: &RayBlob<'_>| {
+        let found = blob.lookup(sighting.camera, sighting.pixel());
+        found.map_err(|error| error.code()).map(|found| Ray {
+            origin_mm: found.origin_mm.into(),
+            direction: found.direction.into(),
+        })
+    };
+    // SAFETY: both are null or what they should be, says the caller.
+    unsafe { answer(rig, ray, ask) }
+}
+
+/// The point of a match.
+///
+/// # Safety
+/// As `rays.h` says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rays_triangulate(
+    rig: *const Rig,
+    first: Sighting,
+    second: Sighting,
+    point: *mut Point,
+) -> c_int {
+    let ask = |blob: &RayBlob<'_>| {
+        let found = blob.triangulate(first.of_rust(), second.of_rust());
+        found.map_err(MeasureError::code).map(|found| Point {
+            point_mm: found.point_mm.into(),
+            gap_squared_mm2: found.gap_squared_mm2,
+        })
+    };
+    // SAFETY: both are null or what they should be, says the caller.
+    unsafe { answer(rig, point, ask) }
+}
+
+/// The point of a match and its standard deviations.
+///
+/// # Safety
+/// As `rays.h` says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rays_triangulate_with_covariance(
+    rig: *const Rig,
+    first: Sighting,
+    second: Sighting,
+    measurement: *mut Measurement,
+) -> c_int {
+    let ask = |blob: &RayBlob<'_>| {
+        let measured = blob.triangulate_with_covariance(first.of_rust(), second.of_rust());
+        measured.map_err(MeasureError::code).map(|measured| {
+            let sigma_mm = measured.covariance.map(|covariance| covariance.sigma_mm());
+            Measurement {
+                point_mm: measured.found.point_mm.into(),
+                gap_squared_mm2: measured.found.gap_squared_mm2,
+                sigma_mm: sigma_mm.unwrap_or_default(),
+                has_sigma: sigma_mm.is_some().into(),
+            }
+        })
+    };
+    // SAFETY: both are null or what they should be, says the caller.
+    unsafe { answer(rig, measurement, ask) }
+}
+
+/// Runs the blob's self-tests.
+///
+/// # Safety
+/// As `rays.h` says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rays_self_test(rig: *const Rig, number: *mut usize) -> c_int {
+    // SAFETY: null or a rig that went through `rays_open`, says the caller.
+    let Some(blob) = (unsafe { blob(rig) }) else {
+        return if rig.is_null() {
+            BAD_ARGUMENT
+        } else {
+            NOT_OPEN
+        };
+    };
+    let (count, code) = match blob.run_self_tests() {
+        Ok(count) => (count, OK),
+        Err(failure) => (failure.test, SELF_TEST_FAILED),
+    };
+    if !number.is_null() {
+        // SAFETY: not null, hence a size_t.
+        unsafe { number.write(count) };
+    }
+    code
+}
+
+impl Sighting {
+    const fn pixel(self) -> PixelPoint {
+        PixelPoint::new(self.u_px, self.v_px)
+    }
+
+    const fn of_rust(self) -> (usize, PixelPoint) {
+        (self.camera, self.pixel())
+    }
+}
+
+/// The bytes, unless the pointer is null or no object has that many.
+///
+/// # Safety
+/// `start` is null or points to `length` bytes that nobody changes during `'a`.
+unsafe fn slice<'a>(start: *const u8, length: usize) -> Option<&'a [u8]> {
+    if start.is_null() || isize::try_from(length).is_err() {
+        return None;
+    }
+    // SAFETY: not null, not too long, and the rest is the caller's word.
+    Some(unsafe { core::slice::from_raw_parts(start, length) })
+}
+
+/// The blob of a rig, if it is open.
+///
+/// # Safety
+/// `rig` is null or went through [`rays_open`], and its blob is unchanged.
+unsafe fn blob<'a>(rig: *const Rig) -> Option<&'a RayBlob<'static>> {
+    // SAFETY: null or an `Opened`, which is what `rays_open` leaves in every rig.
+    let opened = unsafe { rig.cast::<Opened>().as_ref() }?;
+    if opened.state != OPEN {
+        return None;
+    }
+    // SAFETY: the state says so only once the blob is written.
+    Some(unsafe { opened.blob.assume_init_ref() })
+}
+
+/// Asks the rig's blob and writes the answer, or leaves its place as it is; the code.
+///
+/// # Safety
+/// As for [`blob`], and `place` is null or memory for a `T`.
+unsafe fn answer<T>(
+    rig: *const Rig,
+    place: *mut T,
+    ask: impl Fn(&RayBlob<'_>) -> Result<T, u8>,
+) -> c_int {
+    if rig.is_null() || place.is_null() {
+        return BAD_ARGUMENT;
+    }
+    // SAFETY: the caller's word.
+    let Some(blob) = (unsafe { blob(rig) }) else {
+        return NOT_OPEN;
+    };
+    match ask(blob) {
+        Ok(answer) => {
+            // SAFETY: not null, hence memory for a `T`.
+            unsafe { place.write(answer) };
+            OK
+        }
+        Err(code) => code.into(),
+    }
+}
+
+/// Something that panics, to show that it does not link.
+#[cfg(feature = "panics")]
+#[unsafe(no_mangle)]
+pub extern "C" fn rays_panic(index: usize) -> u32 {
+    static NUMBERS: [u32; 3] = [3, 1, 4];
+    NUMBERS[index]
+}
+
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    unsafe extern "C" {
+        fn a_panic_is_reachable_in_this_library() -> !;
+    }
+    // SAFETY: never linked, hence never called.
+    unsafe { a_panic_is_reachable_in_this_library() }
+}

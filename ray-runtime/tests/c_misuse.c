@@ -1,0 +1,96 @@
+/* Everything that can be done wrong with rays.h has a code of its own, and leaves what it was to write to as it was. */
+#include "rays.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static uint64_t memory[1 << 12];
+
+#define EXPECT(expression, value)                                                                  \
+    do {                                                                                           \
+        long found = (long)(expression);                                                           \
+        if (found != (long)(value)) {                                                              \
+            printf("line %d: %s is %ld\n", __LINE__, #expression, found);                          \
+            return 1;                                                                              \
+        }                                                                                          \
+    } while (0)
+
+int main(int count, char **arguments)
+{
+    FILE *file = count == 2 ? fopen(arguments[1], "rb") : NULL;
+    if (file == NULL) {
+        return 2;
+    }
+    unsigned char *bytes = (unsigned char *)memory;
+    const size_t length = fread(bytes, 1, sizeof memory, file);
+    fclose(file);
+
+    rays_rig rig;
+    memset(&rig, 0, sizeof rig);
+    rays_sighting first = {0, 30.0f, 20.5f}, second = {1, 33.0f, 21.0f};
+    rays_ray ray;
+    memset(&ray, 0x55, sizeof ray);
+    const rays_ray untouched = ray;
+    rays_point point;
+    rays_measurement measurement;
+    uint32_t stated = 7;
+    size_t number = 7;
+
+    /* Before it is open. */
+    EXPECT(rays_camera_count(&rig), 0);
+    EXPECT(rays_camera_count(NULL), 0);
+    EXPECT(rays_lookup(&rig, first, &ray), RAYS_NOT_OPEN);
+    EXPECT(rays_self_test(&rig, &number), RAYS_NOT_OPEN);
+    EXPECT(number, 7);
+
+    /* Blobs that are none. */
+    EXPECT(rays_stated_len(bytes, 23, &stated), RAYS_TRUNCATED);
+    EXPECT(rays_stated_len(NULL, length, &stated), RAYS_BAD_ARGUMENT);
+    EXPECT(rays_stated_len(bytes, length, NULL), RAYS_BAD_ARGUMENT);
+    EXPECT(stated, 7);
+    EXPECT(rays_stated_len(bytes, length, &stated), RAYS_OK);
+    EXPECT(stated, length);
+    EXPECT(rays_open(NULL, bytes, length), RAYS_BAD_ARGUMENT);
+    EXPECT(rays_open(&rig, NULL, length), RAYS_BAD_ARGUMENT);
+    EXPECT(rays_open(&rig, bytes, SIZE_MAX), RAYS_BAD_ARGUMENT);
+    EXPECT(rays_open(&rig, bytes, length - 8), RAYS_TRUNCATED);
+    EXPECT(rays_open(&rig, bytes, length + 8), RAYS_TRAILING_BYTES);
+    EXPECT(rays_open(&rig, bytes + 4, length), RAYS_BAD_MAGIC);
+    bytes[4] = 9;
+    EXPECT(rays_open(&rig, bytes, length), RAYS_WRONG_VERSION);
+    bytes[4] = 2;
+    bytes[length / 2] ^= 1;
+    EXPECT(rays_open(&rig, bytes, length), RAYS_BAD_CRC);
+    bytes[length / 2] ^= 1;
+    memmove(bytes + 4, bytes, length);
+    EXPECT(rays_open(&rig, bytes + 4, length), RAYS_MISALIGNED);
+    memmove(bytes, bytes + 4, length);
+    EXPECT(rays_triangulate(&rig, first, second, &point), RAYS_NOT_OPEN);
+
+    /* An open one. */
+    EXPECT(rays_open(&rig, bytes, length), RAYS_OK);
+    EXPECT(rays_camera_count(&rig), 2);
+    EXPECT(rays_self_test(&rig, NULL), RAYS_OK);
+    EXPECT(rays_self_test(&rig, &number), RAYS_OK);
+    EXPECT(number, 10);
+    EXPECT(rays_lookup(NULL, first, &ray), RAYS_BAD_ARGUMENT);
+    EXPECT(rays_lookup(&rig, first, NULL), RAYS_BAD_ARGUMENT);
+    first.u_px = -1.0f;
+    EXPECT(rays_lookup(&rig, first, &ray), RAYS_OUTSIDE);
+    EXPECT(rays_triangulate_with_covariance(&rig, first, second, &measurement), RAYS_OUTSIDE);
+    first.u_px = 30.0f;
+    first.camera = 2;
+    EXPECT(rays_lookup(&rig, first, &ray), RAYS_NO_SUCH_CAMERA);
+    first.camera = 1;
+    EXPECT(rays_triangulate(&rig, second, second, &point), RAYS_PARALLEL);
+    EXPECT(memcmp(&ray, &untouched, sizeof ray), 0);
+    first.camera = 0;
+    EXPECT(rays_triangulate_with_covariance(&rig, first, second, &measurement), RAYS_OK);
+    EXPECT(measurement.has_sigma, 1);
+
+    /* A failed opening closes a rig. */
+    EXPECT(rays_open(&rig, bytes, 8), RAYS_TRUNCATED);
+    EXPECT(rays_lookup(&rig, first, &ray), RAYS_NOT_OPEN);
+    puts("all as it should be");
+    return 0;
+}
