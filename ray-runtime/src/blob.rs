@@ -196,8 +196,10 @@ impl<'a> RayBlob<'a> {
         b: (usize, PixelPoint),
     ) -> Result<Triangulation, MeasureError> {
         // By reference: a ray that is passed on as a result of its own is copied word by word.
-        let rays = (self.lookup(a.0, a.1), self.lookup(b.0, b.1));
-        match (&rays.0, &rays.1) {
+        let (ray_a, ray_b);
+        ray_a = self.lookup(a.0, a.1);
+        ray_b = self.lookup(b.0, b.1);
+        match (&ray_a, &ray_b) {
             (Ok(ray_a), Ok(ray_b)) => triangulate::triangulate_pair(ray_a, ray_b),
             (Err(error), _) => Err(MeasureError::of_lookup(*error, a.0)),
             (_, Err(error)) => Err(MeasureError::of_lookup(*error, b.0)),

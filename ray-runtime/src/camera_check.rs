@@ -103,7 +103,11 @@ impl CameraCheck<'_> {
             return Err(self.layout(Table::Grid));
         }
         let extent_px = [meta.region_width, meta.region_height];
-        let expected = QuantizedHeader::new(direction, Some(offset), extent_px, cells);
+        let second = (!is_central).then_some(offset);
+        let expected = QuantizedHeader::new(direction, second, extent_px, cells);
+        if header.knots_start != expected.knots_start {
+            return Err(self.layout(Table::Grid));
+        }
         let is_unit = |map: QuantizedMap| map.unit >= 0.0 && is_moderate(map.unit);
         if !(header.scale == expected.scale
             && header.places_per_px == expected.places_per_px
@@ -112,7 +116,7 @@ impl CameraCheck<'_> {
         {
             return Err(self.number(Table::Grid));
         }
-        let layout = header.layout(is_central, cells);
+        let layout = header.layout(cells);
         let at = |place: usize| start.saturating_add(place);
         self.check_numbers(at(QUANTIZED_HEADER_LEN), at(layout.direction_knots))?;
         let end = at(layout.offset_knots_end);

@@ -7,6 +7,9 @@ use crate::weights::{Weights, high, low};
 
 /// A knot of two channels.
 pub(crate) trait Knot: Copy {
+    /// The same pairs of numbers, seen as knots.
+    fn seen_in(pairs: &[[f32; 2]]) -> &[Self];
+
     /// The two channels of a row of knots, weighed. The sum stays below 2^31, as the weights' does
     /// below 2^16.
     fn weighed(row: &[Self; 4], weights: Weights) -> (i32, i32);
@@ -14,6 +17,11 @@ pub(crate) trait Knot: Copy {
 
 /// Two i16 in a word of a table, which is seen as f32.
 impl Knot for f32 {
+    #[inline(always)]
+    fn seen_in(pairs: &[[f32; 2]]) -> &[Self] {
+        pairs.as_flattened()
+    }
+
     #[inline(always)]
     fn weighed(row: &[Self; 4], weights: Weights) -> (i32, i32) {
         let words = row.map(|knot| knot.to_bits().cast_signed());
@@ -25,6 +33,11 @@ impl Knot for f32 {
 }
 
 impl Knot for [i8; 2] {
+    #[inline(always)]
+    fn seen_in(pairs: &[[f32; 2]]) -> &[Self] {
+        bytemuck::cast_slice(pairs)
+    }
+
     #[inline(always)]
     fn weighed(row: &[Self; 4], weights: Weights) -> (i32, i32) {
         (
@@ -40,7 +53,7 @@ pub(crate) struct Window {
     /// Number of the first.
     first: usize,
     /// Knots in a row.
-    stride: usize,
+    stride: u16,
     /// The share of the cell before the pixel, along u and along v.
     pub shares: [i32; 2],
 }
@@ -52,34 +65,37 @@ impl Window {
         let [cells_u, _] = record.cells();
         let place_u = (from_edge.u * places_per_px[0]) as u32;
         let place_v = (from_edge.v * places_per_px[1]) as u32;
-        let stride = cells_u.wrapping_add(3);
-        let first = (place_v / PLACES_PER_CELL)
-            .wrapping_mul(stride)
-            .wrapping_add(place_u / PLACES_PER_CELL);
+        // No more cells than fit, as `open` saw.
+        let stride = (cells_u + 3) as u16;
+        let first = (place_v / PLACES_PER_CELL) * u32::from(stride) + place_u / PLACES_PER_CELL;
         Self {
             first: first as usize,
-            stride: stride as usize,
+            stride,
             shares: [place_u, place_v].map(|place| (place % PLACES_PER_CELL).cast_signed()),
         }
     }
 
-    /// The knots blended with weights along u in each of the four rows, without any rounding, and then
-    /// along v. `None` if there are too few knots.
+    /// The knots behind the first so many pairs of a table, blended with weights along u in each of the
+    /// four rows, without any rounding, and then along v. `None` if there are too few knots.
     #[inline(always)]
     pub fn blend<K: Knot>(
-        self,
-        knots: &[K],
+        &self,
+        pairs: &[[f32; 2]],
+        knots_start: usize,
         along_u: Weights,
         along_v: Weights,
     ) -> Option<(i32, i32)> {
-        let rows = knots.get(self.first..)?;
+        let knots = K::seen_in(pairs);
+        let stride = usize::from(self.stride);
+        let first = knots_start * (size_of::<[f32; 2]>() / size_of::<K>()) + self.first;
         // One check in place of four: the compiler sees what follows from it.
-        if rows.len() < self.stride.checked_mul(3)?.checked_add(4)? {
+        let rows = knots.get(first..)?;
+        if rows.len() < 3 * stride + 4 {
             return None;
         }
         let mut sums = (0, 0);
         for (j, weight) in along_v.each().into_iter().enumerate() {
-            let row = rows.get(j * self.stride..)?.first_chunk()?;
+            let row = rows.get(j * stride..j * stride + 4)?.first_chunk()?;
             let (a, b) = K::weighed(row, along_u);
             sums.0 += upper(a, weight);
             sums.1 += upper(b, weight);

@@ -93,7 +93,8 @@ impl Views<'_> {
                 let [s, n] = self.patch::<2, f32>(record, pixel)?;
                 Ok(shifted_ray(record, Sample { s, n }))
             }
-            _ => lookup_other(self.pairs, record, pixel),
+            _ if is_spline(record) => lookup_spline(self.pairs, record, pixel),
+            _ => quantized::lookup(self.pairs, record, from_edge(record, pixel)),
         }
     }
 
@@ -166,20 +167,6 @@ impl Views<'_> {
     }
 }
 
-/// The ray of a calibrated pixel from a table of another form than patches. Its arguments fit the
-/// registers, so that it takes the place of what calls it last, on the stack too.
-#[inline(never)]
-fn lookup_other(
-    pairs: &[[f32; 2]],
-    record: Record<'_>,
-    pixel: PixelPoint,
-) -> Result<Ray, LookupError> {
-    if is_spline(record) {
-        return lookup_spline(pairs, record, pixel);
-    }
-    quantized::lookup(pairs, record, from_edge(record, pixel))
-}
-
 /// Whether a table is of the form of old versions; never, so that nothing of it is linked, where they
 /// are not read.
 #[inline(always)]
@@ -215,7 +202,7 @@ impl MovingRay {
 
 /// The ray of a sample of a camera's table, rig frame.
 #[inline(always)]
-fn ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
+pub(crate) fn ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
     if record.is_central() {
         central_ray(record, sample.s)
     } else {
@@ -224,7 +211,7 @@ fn ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
 }
 
 #[inline(always)]
-pub(crate) fn central_ray(record: Record<'_>, s: [f32; 2]) -> Ray {
+fn central_ray(record: Record<'_>, s: [f32; 2]) -> Ray {
     Ray {
         origin_mm: record.translation_mm().into(),
         direction: direction(record.rotation(), s),
@@ -232,7 +219,7 @@ pub(crate) fn central_ray(record: Record<'_>, s: [f32; 2]) -> Ray {
 }
 
 #[inline(always)]
-pub(crate) fn shifted_ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
+fn shifted_ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
     Ray {
         origin_mm: origin(record.rotation(), record.translation_mm(), sample),
         direction: direction(record.rotation(), sample.s),

@@ -116,6 +116,22 @@ macro_rules! written_out {
     }};
 }
 
+/// [`evaluate`] of a degree up to 3. `None` if there are too few coefficients.
+#[inline(always)]
+pub(crate) fn up_to_cubic(
+    coefficients: &[[f32; 2]],
+    degree: u8,
+    x: f32,
+    y: f32,
+) -> Option<(f32, f32)> {
+    match degree {
+        0 => written_out!(coefficients, x, y,),
+        1 => written_out!(coefficients, x, y, 2),
+        2 => written_out!(coefficients, x, y, 2 3),
+        _ => written_out!(coefficients, x, y, 2 3 4),
+    }
+}
+
 #[inline(never)]
 fn fifth_degree(coefficients: &[[f32; 2]; 21], x: f32, y: f32) -> Option<(f32, f32)> {
     written_out!(coefficients, x, y, 2 3 4 5 6)

@@ -12,7 +12,9 @@ use crate::weights::Weights;
 use crate::{LookupError, Ray};
 
 /// The ray of a pixel of the calibrated area, seen from the outer edge of the region.
-#[inline(always)]
+///
+/// Its arguments fit the registers, so that it takes the place of what calls it last, on the stack too.
+#[inline(never)]
 pub(crate) fn lookup(
     pairs: &[[f32; 2]],
     record: Record<'_>,
@@ -20,14 +22,23 @@ pub(crate) fn lookup(
 ) -> Result<Ray, LookupError> {
     // Nothing of this is missing in a blob that was opened: the sizes of its parts were checked.
     let table = Table::of(pairs, record).ok_or(LookupError::Outside)?;
-    let direction = table.direction().ok_or(LookupError::Outside)?;
-    let s = table.value(direction, from_edge);
-    if record.is_central() {
-        return Ok(lookup::central_ray(record, s));
-    }
-    let offset = table.offset().ok_or(LookupError::Outside)?;
-    let n = table.value(offset, from_edge);
-    Ok(lookup::shifted_ray(record, Sample { s, n }))
+    let Some(polynomials) = table.usual_polynomials() else {
+        return lookup_any(pairs, record, from_edge);
+    };
+    let sample = table.usual_sample(polynomials, from_edge);
+    Ok(lookup::ray(record, sample.ok_or(LookupError::Outside)?))
+}
+
+/// [`lookup`] of any degrees and knots.
+#[inline(never)]
+fn lookup_any(
+    pairs: &[[f32; 2]],
+    record: Record<'_>,
+    from_edge: PixelPoint,
+) -> Result<Ray, LookupError> {
+    let table = Table::of(pairs, record).ok_or(LookupError::Outside)?;
+    let sample = table.sample(from_edge).ok_or(LookupError::Outside)?;
+    Ok(lookup::ray(record, sample))
 }
 
 /// The sample at a pixel of the region, with its derivatives by the pixel.
@@ -48,34 +59,39 @@ pub(crate) fn sample_moving(
     Some(Sample { s, n })
 }
 
-/// A table: its header, and what follows.
+/// A table, and whatever follows it.
 #[derive(Clone, Copy)]
 struct Table<'a> {
     record: Record<'a>,
+    pairs: &'a [[f32; 2]],
     header: &'a [[f32; 2]; QUANTIZED_HEADER_PAIRS],
-    rest: &'a [[f32; 2]],
 }
 
-/// One of a table's maps. Behind its coefficients and its knots, whatever follows.
+/// One of a table's maps.
 #[derive(Clone, Copy)]
 struct Map<'a> {
     degree: u8,
     number_len: u8,
     /// What a blend of knots counts.
     unit: f32,
+    /// And whatever follows them.
     coefficients: &'a [[f32; 2]],
-    knots: &'a [[f32; 2]],
+    /// Pairs of the table before the knots.
+    knots_start: usize,
 }
+
+/// Coefficients of a cubic.
+const CUBIC: usize = coefficient_count(3);
 
 impl<'a> Table<'a> {
     #[inline(always)]
     fn of(pairs: &'a [[f32; 2]], record: Record<'a>) -> Option<Self> {
         let start = (record.grid_offset() >> 3) as usize;
-        let (header, rest) = pairs.get(start..)?.split_first_chunk()?;
+        let pairs = pairs.get(start..)?;
         Some(Self {
             record,
-            header,
-            rest,
+            pairs,
+            header: pairs.first_chunk()?,
         })
     }
 
@@ -85,40 +101,33 @@ impl<'a> Table<'a> {
         self.header[0][0].to_bits().to_le_bytes()
     }
 
+    /// Pairs of the table before the knots of the direction.
     #[inline(always)]
+    fn knots_start(&self) -> usize {
+        (self.header[0][1].to_bits() >> 3) as usize
+    }
+
     fn direction(&self) -> Option<Map<'a>> {
-        let [degree, number_len, offset_degree, _] = self.kinds();
-        let offset_count = if self.record.is_central() {
-            0
-        } else {
-            coefficient_count(offset_degree.into())
-        };
-        let knots = coefficient_count(degree.into()) + offset_count;
+        let [degree, number_len, ..] = self.kinds();
         Some(Map {
             degree,
             number_len,
             unit: self.header[1][0],
-            coefficients: self.rest,
-            knots: self.rest.get(knots..)?,
+            coefficients: self.pairs.get(QUANTIZED_HEADER_PAIRS..)?,
+            knots_start: self.knots_start(),
         })
     }
 
-    #[inline(always)]
     fn offset(&self) -> Option<Map<'a>> {
-        let direction = self.direction()?;
-        let [_, _, degree, number_len] = self.kinds();
-        let start = coefficient_count(direction.degree.into());
-        let knots = if number_len == 0 {
-            0
-        } else {
-            knots_len(self.record.cells(), direction.number_len).div_ceil(ALIGNMENT)
-        };
+        let [direction_degree, direction_len, degree, number_len] = self.kinds();
+        let start = QUANTIZED_HEADER_PAIRS + coefficient_count(direction_degree.into());
+        let direction_knots = knots_len(self.record.cells(), direction_len).div_ceil(ALIGNMENT);
         Some(Map {
             degree,
             number_len,
             unit: self.header[1][1],
-            coefficients: self.rest.get(start..)?,
-            knots: direction.knots.get(knots..)?,
+            coefficients: self.pairs.get(start..)?,
+            knots_start: self.knots_start() + direction_knots,
         })
     }
 
@@ -129,22 +138,74 @@ impl<'a> Table<'a> {
         (from_edge.u * scale_u - 1.0, from_edge.v * scale_v - 1.0)
     }
 
+    /// The polynomials of what most tables are: knots of i16 on a cubic and, unless the camera is
+    /// central, a polynomial of degree 3 at most for the offset. `None` of other tables.
     #[inline(always)]
-    fn places_per_px(&self) -> [f32; 2] {
-        self.header[3]
+    fn usual_polynomials(&self) -> Option<&'a [[f32; 2]; 2 * CUBIC]> {
+        let [degree, number_len, offset_degree, offset_number_len] = self.kinds();
+        if degree == 3 && number_len == 2 && offset_degree <= 3 && offset_number_len == 0 {
+            let (_, polynomials) = self
+                .pairs
+                .first_chunk::<{ QUANTIZED_HEADER_PAIRS + 2 * CUBIC }>()?
+                .split_first_chunk::<QUANTIZED_HEADER_PAIRS>()?;
+            polynomials.first_chunk()
+        } else {
+            None
+        }
     }
 
+    /// The sample of such a table at a pixel, written out.
     #[inline(always)]
-    fn value(&self, map: Map<'_>, from_edge: PixelPoint) -> [f32; 2] {
+    fn usual_sample(
+        &self,
+        polynomials: &[[f32; 2]; 2 * CUBIC],
+        from_edge: PixelPoint,
+    ) -> Option<Sample<f32>> {
+        let (direction, offset) = polynomials.split_first_chunk()?;
+        let left = self.blend::<f32>(self.knots_start(), from_edge)?;
+        let (x, y) = self.variables(from_edge);
+        let [a, b] = polynomial::cubic(direction, x, y);
+        let unit = self.header[1][0];
+        let [_, _, offset_degree, _] = self.kinds();
+        Some(Sample {
+            s: [a + unit * left.0, b + unit * left.1],
+            n: if self.record.is_central() {
+                [0.0; 2]
+            } else {
+                polynomial::up_to_cubic(offset, offset_degree, x, y)?.into()
+            },
+        })
+    }
+
+    /// The sample at a pixel.
+    fn sample(&self, from_edge: PixelPoint) -> Option<Sample<f32>> {
+        let s = self.value(self.direction()?, from_edge)?;
+        let n = if self.record.is_central() {
+            [0.0; 2]
+        } else {
+            self.value(self.offset()?, from_edge)?
+        };
+        Some(Sample { s, n })
+    }
+
+    fn value(&self, map: Map<'_>, from_edge: PixelPoint) -> Option<[f32; 2]> {
         let (x, y) = self.variables(from_edge);
         let (a, b) = polynomial::evaluate(map.coefficients, map.degree, x, y);
-        let blend = match map.number_len {
-            0 => return [a, b],
-            1 => blend_of_bytes,
-            _ => blend_of_words,
+        let left = match map.number_len {
+            0 => return Some([a, b]),
+            1 => self.blend::<[i8; 2]>(map.knots_start, from_edge)?,
+            _ => self.blend::<f32>(map.knots_start, from_edge)?,
         };
-        let left = blend(map.knots, self.record, self.places_per_px(), from_edge);
-        [a + map.unit * left.0, b + map.unit * left.1]
+        Some([a + map.unit * left.0, b + map.unit * left.1])
+    }
+
+    /// The knots' blend at a pixel, in units.
+    #[inline(always)]
+    fn blend<K: Knot>(&self, knots_start: usize, from_edge: PixelPoint) -> Option<(f32, f32)> {
+        let window = Window::at(self.record, self.header[3], from_edge);
+        let [along_u, along_v] = window.shares.map(Weights::at);
+        let (a, b) = window.blend::<K>(self.pairs, knots_start, along_u, along_v)?;
+        Some((a as f32, b as f32))
     }
 
     fn value_moving(&self, map: Map<'_>, from_edge: PixelPoint) -> Option<[Dual; 2]> {
@@ -156,7 +217,7 @@ impl<'a> Table<'a> {
         if map.number_len == 0 {
             return Some(sums);
         }
-        let window = Window::at(self.record, self.places_per_px(), from_edge);
+        let window = Window::at(self.record, self.header[3], from_edge);
         let [value_u, value_v] = window.shares.map(Weights::at);
         let [slope_u, slope_v] = window.shares.map(Weights::half_slopes);
         let per_px = [self.record.axis_u(), self.record.axis_v()].map(|axis| axis.cells_per_px);
@@ -166,11 +227,12 @@ impl<'a> Table<'a> {
             (value_u, slope_v, map.unit * (2.0 * per_px[1])),
         ];
         for (way, (along_u, along_v, unit)) in ways.into_iter().enumerate() {
-            let left = if map.number_len == 1 {
-                window.blend::<[i8; 2]>(bytemuck::cast_slice(map.knots), along_u, along_v)?
+            let blend = if map.number_len == 1 {
+                Window::blend::<[i8; 2]>
             } else {
-                window.blend(map.knots.as_flattened(), along_u, along_v)?
+                Window::blend::<f32>
             };
+            let left = blend(&window, self.pairs, map.knots_start, along_u, along_v)?;
             for (sum, left) in sums.iter_mut().zip([left.0, left.1]) {
                 let part = match way {
                     0 => &mut sum.value,
@@ -181,47 +243,5 @@ impl<'a> Table<'a> {
             }
         }
         Some(sums)
-    }
-}
-
-/// The knots' blend at a pixel; not a number if there are too few.
-#[inline(never)]
-fn blend_of_words(
-    knots: &[[f32; 2]],
-    record: Record<'_>,
-    places_per_px: [f32; 2],
-    from_edge: PixelPoint,
-) -> (f32, f32) {
-    blend(knots.as_flattened(), record, places_per_px, from_edge)
-}
-
-/// The same of i8.
-#[inline(never)]
-fn blend_of_bytes(
-    knots: &[[f32; 2]],
-    record: Record<'_>,
-    places_per_px: [f32; 2],
-    from_edge: PixelPoint,
-) -> (f32, f32) {
-    blend::<[i8; 2]>(
-        bytemuck::cast_slice(knots),
-        record,
-        places_per_px,
-        from_edge,
-    )
-}
-
-#[inline(always)]
-fn blend<K: Knot>(
-    knots: &[K],
-    record: Record<'_>,
-    places_per_px: [f32; 2],
-    from_edge: PixelPoint,
-) -> (f32, f32) {
-    let window = Window::at(record, places_per_px, from_edge);
-    let [along_u, along_v] = window.shares.map(Weights::at);
-    match window.blend(knots, along_u, along_v) {
-        Some((a, b)) => (a as f32, b as f32),
-        None => (f32::NAN, f32::NAN),
     }
 }

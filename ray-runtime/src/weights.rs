@@ -10,6 +10,7 @@
 //! knots alone.
 
 use crate::format::PLACES_PER_CELL;
+use core::hint::black_box;
 
 /// A share of all of a cell: shares count places on the grid.
 const CELL: i32 = PLACES_PER_CELL.cast_signed();
@@ -17,7 +18,7 @@ const CELL: i32 = PLACES_PER_CELL.cast_signed();
 /// What four weights add up to, without the sign.
 pub(crate) const SUM: i32 = 6 << 13;
 
-/// Weights of four knots, two to a word, the first in the lower half.
+/// Weights of four knots, two to a word: in the upper halves those of the first and the last.
 #[derive(Clone, Copy)]
 pub(crate) struct Weights(i32, i32);
 
@@ -41,13 +42,18 @@ impl Weights {
 
     #[inline(always)]
     fn packed(a: i32, b: i32, c: i32, d: i32) -> Self {
-        Self((a & 0xffff) | b << 16, (c & 0xffff) | d << 16)
+        // The compiler would take the four apart again where it sees how they were put together, and
+        // has no registers for eight of them.
+        Self(
+            black_box((b & 0xffff) | a << 16),
+            black_box((c & 0xffff) | d << 16),
+        )
     }
 
     /// The numbers one by one.
     #[inline(always)]
     pub fn each(self) -> [i32; 4] {
-        [low(self.0), high(self.0), low(self.1), high(self.1)]
+        [high(self.0), low(self.0), low(self.1), high(self.1)]
     }
 
     /// Four numbers of 16 binary digits, weighed.

@@ -7,7 +7,7 @@ use super::table::{Table, Target};
 use crate::field::CalibratedCamera;
 use crate::geometry::PixelPoint;
 use ray_runtime::format::{
-    Encoding, Form, MAX_DEGREE, QuantizedHeader, QuantizedLayout, QuantizedMap, UNITS_PER_STEP,
+    Encoding, Form, MAX_DEGREE, QuantizedHeader, QuantizedMap, UNITS_PER_STEP,
 };
 
 /// Bytes of a knot's number.
@@ -122,7 +122,7 @@ impl<'a> Predictors<'a> {
     /// Bytes of the table with a direction polynomial of this degree and these knots.
     pub fn byte_count(&self, degree: u8, number: Number, cells: [u32; 2]) -> usize {
         let header = self.header(degree, number, [0.0; 2], cells);
-        self.layout(&header, cells).offset_knots_end
+        header.layout(cells).offset_knots_end
     }
 
     fn header(
@@ -144,10 +144,6 @@ impl<'a> Predictors<'a> {
             map(offset.degree as u8, number, offset_step)
         });
         QuantizedHeader::new(direction, offset, [sensor.width, sensor.height], cells)
-    }
-
-    fn layout(&self, header: &QuantizedHeader, cells: [u32; 2]) -> QuantizedLayout {
-        header.layout(self.offset.is_none(), cells)
     }
 
     /// The knots of the offset, beside those of the direction.
@@ -197,7 +193,7 @@ impl<'a> Predictors<'a> {
         };
         let steps = [step([0, 1], number), step([2, 3], offset_number)];
         let header = self.header(degree, number, steps, cells);
-        let layout = self.layout(&header, cells);
+        let layout = header.layout(cells);
 
         let mut bytes = header.to_bytes().to_vec();
         push_coefficients(&mut bytes, &direction, [0, 1]);

@@ -38,14 +38,14 @@ pub struct QuantizedHeader {
     pub scale: [f32; 2],
     /// [`places_per_px`] along u and v.
     pub places_per_px: [f32; 2],
+    /// Where the knots of the half-angle vector start, or would: [`QuantizedLayout::direction_knots`].
+    pub knots_start: u32,
 }
 
 /// Where the parts of a quantized table lie, bytes from its start: the coefficients of both maps, then
 /// the knots of both, each map's with zeros up to a multiple of 8.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct QuantizedLayout {
-    /// Where the coefficients of the offset start, or would.
-    pub offset_coefficients: usize,
     /// Where the knots of the half-angle vector start, or would.
     pub direction_knots: usize,
     /// Where they end.
@@ -69,52 +69,54 @@ impl QuantizedHeader {
         extent_px: [u32; 2],
         cells: [u32; 2],
     ) -> Self {
-        let offset = match offset {
-            Some(offset) => offset,
-            None => QuantizedMap {
-                degree: 0,
-                number_len: 0,
-                unit: 0.0,
-            },
+        let direction_end = QUANTIZED_HEADER_LEN + coefficients_len(direction);
+        let (offset, knots_start) = match offset {
+            Some(offset) => (offset, direction_end + coefficients_len(offset)),
+            None => {
+                let none = QuantizedMap {
+                    degree: 0,
+                    number_len: 0,
+                    unit: 0.0,
+                };
+                (none, direction_end)
+            }
         };
-        let [width, height] = [extent_px[0] as f32, extent_px[1] as f32];
         Self {
             direction,
             offset,
-            scale: [2.0 / width, 2.0 / height],
+            scale: [2.0 / extent_px[0] as f32, 2.0 / extent_px[1] as f32],
             places_per_px: [
                 places_per_px(cells[0], extent_px[0]),
                 places_per_px(cells[1], extent_px[1]),
             ],
+            knots_start: knots_start as u32,
         }
     }
 
-    /// Where the parts of the table are.
-    pub const fn layout(&self, is_central: bool, cells: [u32; 2]) -> QuantizedLayout {
-        let offset_coefficients = QUANTIZED_HEADER_LEN + coefficients_len(self.direction);
-        let direction_knots = if is_central {
-            offset_coefficients
-        } else {
-            offset_coefficients + coefficients_len(self.offset)
-        };
-        let direction_knots_end = direction_knots + knots_len(cells, self.direction.number_len);
+    /// Where the parts of the table are, over a grid of `cells`.
+    pub const fn layout(&self, cells: [u32; 2]) -> QuantizedLayout {
+        let direction_knots = self.knots_start as usize;
+        let direction_knots_end =
+            direction_knots.saturating_add(knots_len(cells, self.direction.number_len));
         let offset_knots = aligned(direction_knots_end);
         QuantizedLayout {
-            offset_coefficients,
             direction_knots,
             direction_knots_end,
             offset_knots,
-            offset_knots_end: offset_knots + knots_len(cells, self.offset.number_len),
+            offset_knots_end: offset_knots.saturating_add(knots_len(cells, self.offset.number_len)),
         }
     }
 
-    /// The header at the start of a table. Nothing is judged but bits that mean nothing. `None` if there
-    /// are too few bytes.
+    /// The header at the start of a table. Nothing is judged. `None` if there are too few bytes.
     pub fn read(pairs: &[[f32; 2]]) -> Option<Self> {
-        let [[kinds, reserved], [unit, offset_unit], scale, places_per_px] =
-            *pairs.first_chunk::<QUANTIZED_HEADER_PAIRS>()?;
+        let [
+            [kinds, knots_start],
+            [unit, offset_unit],
+            scale,
+            places_per_px,
+        ] = *pairs.first_chunk::<QUANTIZED_HEADER_PAIRS>()?;
         let [degree, number_len, offset_degree, offset_number_len] = kinds.to_bits().to_le_bytes();
-        (reserved.to_bits() == 0).then_some(Self {
+        Some(Self {
             direction: QuantizedMap {
                 degree,
                 number_len,
@@ -127,6 +129,7 @@ impl QuantizedHeader {
             },
             scale,
             places_per_px,
+            knots_start: knots_start.to_bits(),
         })
     }
 
@@ -149,7 +152,7 @@ impl QuantizedHeader {
             places_v,
         ];
         let mut bytes = [0; QUANTIZED_HEADER_LEN];
-        let words = [u32::from_le_bytes(kinds), 0];
+        let words = [u32::from_le_bytes(kinds), self.knots_start];
         let all = words.into_iter().chain(numbers.map(f32::to_bits));
         for (place, byte) in bytes.iter_mut().zip(all.flat_map(u32::to_le_bytes)) {
             *place = byte;
@@ -185,31 +188,28 @@ mod tests {
         };
         let (direction, offset) = (map(5, 2, 0.001), map(3, 1, 0.5));
         let header = QuantizedHeader::new(direction, Some(offset), [64, 48], [3, 2]);
-        let layout = header.layout(false, [3, 2]);
+        let layout = header.layout([3, 2]);
         // 21 coefficients of two f32, and 10; 6 x 5 knots of two i16, and of two i8.
-        assert_eq!(layout.offset_coefficients, 32 + 168);
-        assert_eq!(layout.direction_knots, 200 + 80);
+        assert_eq!(layout.direction_knots, 32 + 168 + 80);
         assert_eq!(layout.direction_knots_end, 280 + 120);
         assert_eq!(layout.offset_knots, 400);
         assert_eq!(layout.offset_knots_end, 400 + 60);
         let bytes = header.to_bytes();
-        assert_eq!(bytes[..8], [5, 2, 3, 1, 0, 0, 0, 0]);
+        assert_eq!(bytes[..8], [5, 2, 3, 1, 24, 1, 0, 0]);
         assert_eq!(bytes[8..12], 0.001f32.to_le_bytes());
         assert_eq!(bytes[12..16], 0.5f32.to_le_bytes());
         assert_eq!(bytes[16..20], (1.0f32 / 32.0).to_le_bytes());
         assert_eq!(bytes[28..], (32766.0f32 / 48.0).to_le_bytes());
 
-        let mut pairs: Vec<[f32; 2]> = bytes
+        let pairs: Vec<[f32; 2]> = bytes
             .chunks(8)
             .map(|pair| [0, 4].map(|k| f32::from_le_bytes(pair[k..k + 4].try_into().unwrap())))
             .collect();
         assert_eq!(QuantizedHeader::read(&pairs), Some(header));
         assert_eq!(QuantizedHeader::read(&pairs[1..]), None);
-        pairs[0][1] = f32::from_bits(1);
-        assert_eq!(QuantizedHeader::read(&pairs), None);
 
         let central = QuantizedHeader::new(map(7, 0, 0.0), None, [64, 48], [1, 1]);
-        assert_eq!(central.layout(true, [1, 1]).offset_knots_end, 32 + 288);
+        assert_eq!(central.layout([1, 1]).offset_knots_end, 32 + 288);
         assert_eq!(central.offset, QuantizedMap::default());
     }
 

@@ -186,7 +186,7 @@ impl TestCamera {
         let direction = map(1, 2, by_knots / f64::from(STEPS_PER_ROW));
         let offset = (!is_central).then_some(map(0, 1, 0.25));
         let header = QuantizedHeader::new(direction, offset, [width, height], self.cells);
-        let layout = header.layout(is_central, self.cells);
+        let layout = header.layout(self.cells);
 
         // Places are rounded down, by half of one on average.
         let by_place = by_knots / f64::from(PLACES_PER_CELL);
