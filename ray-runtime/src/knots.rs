@@ -5,48 +5,6 @@ use crate::PixelPoint;
 use crate::format::{PLACES_PER_CELL, Record};
 use crate::weights::{Weights, high, low};
 
-/// A knot of two channels.
-pub(crate) trait Knot: Copy {
-    /// The same pairs of numbers, seen as knots.
-    fn seen_in(pairs: &[[f32; 2]]) -> &[Self];
-
-    /// The two channels of a row of knots, weighed. The sum stays below 2^31, as the weights' does
-    /// below 2^16.
-    fn weighed(row: &[Self; 4], weights: Weights) -> (i32, i32);
-}
-
-/// Two i16 in a word of a table, which is seen as f32.
-impl Knot for f32 {
-    #[inline(always)]
-    fn seen_in(pairs: &[[f32; 2]]) -> &[Self] {
-        pairs.as_flattened()
-    }
-
-    #[inline(always)]
-    fn weighed(row: &[Self; 4], weights: Weights) -> (i32, i32) {
-        let words = row.map(|knot| knot.to_bits().cast_signed());
-        (
-            weights.applied_to(words.map(low)),
-            weights.applied_to(words.map(high)),
-        )
-    }
-}
-
-impl Knot for [i8; 2] {
-    #[inline(always)]
-    fn seen_in(pairs: &[[f32; 2]]) -> &[Self] {
-        bytemuck::cast_slice(pairs)
-    }
-
-    #[inline(always)]
-    fn weighed(row: &[Self; 4], weights: Weights) -> (i32, i32) {
-        (
-            weights.applied_to(row.map(|knot| knot[0].into())),
-            weights.applied_to(row.map(|knot| knot[1].into())),
-        )
-    }
-}
-
 /// The 4 x 4 knots that matter at a pixel.
 #[derive(Clone, Copy)]
 pub(crate) struct Window {
@@ -75,30 +33,60 @@ impl Window {
         }
     }
 
-    /// The knots behind the first so many pairs of a table, blended with weights along u in each of the
-    /// four rows, without any rounding, and then along v. `None` if there are too few knots.
+    /// The knots of i16 behind the first so many pairs of a table, blended with weights along u in each of
+    /// the four rows, without any rounding, and then along v. `None` if there are too few knots.
     #[inline(always)]
-    pub fn blend<K: Knot>(
+    pub fn blend_words(
         &self,
         pairs: &[[f32; 2]],
         knots_start: usize,
-        along_u: Weights,
-        along_v: Weights,
+        along: [Weights; 2],
     ) -> Option<(i32, i32)> {
-        let knots = K::seen_in(pairs);
-        let stride = usize::from(self.stride);
-        let first = knots_start * (size_of::<[f32; 2]>() / size_of::<K>()) + self.first;
+        // A knot takes half a pair.
+        let knots = pairs.as_flattened().get(2 * knots_start + self.first..)?;
+        self.blend_rows(knots, along, |row| {
+            row.map(|knot| knot.to_bits().cast_signed())
+        })
+    }
+
+    /// The same of i8, if that is what a number has bytes, or of i16.
+    #[inline(never)]
+    pub fn blend(
+        &self,
+        pairs: &[[f32; 2]],
+        knots_start: usize,
+        number_len: u8,
+        along: [Weights; 2],
+    ) -> Option<(i32, i32)> {
+        if number_len != 1 {
+            return self.blend_words(pairs, knots_start, along);
+        }
+        let knots: &[[i8; 2]] = bytemuck::cast_slice(pairs);
+        let knots = knots.get(4 * knots_start + self.first..)?;
+        self.blend_rows(knots, along, |row| {
+            row.map(|[a, b]| (i32::from(a) & 0xffff) | i32::from(b) << 16)
+        })
+    }
+
+    /// `words` has the two numbers of a knot in the two halves of a word.
+    #[inline(always)]
+    fn blend_rows<K>(
+        &self,
+        knots: &[K],
+        [along_u, along_v]: [Weights; 2],
+        words: impl Fn(&[K; 4]) -> [i32; 4],
+    ) -> Option<(i32, i32)> {
         // One check in place of four: the compiler sees what follows from it.
-        let rows = knots.get(first..)?;
-        if rows.len() < 3 * stride + 4 {
+        let stride = usize::from(self.stride);
+        if knots.len() < 3 * stride + 4 {
             return None;
         }
         let mut sums = (0, 0);
         for (j, weight) in along_v.each().into_iter().enumerate() {
-            let row = rows.get(j * stride..j * stride + 4)?.first_chunk()?;
-            let (a, b) = K::weighed(row, along_u);
-            sums.0 += upper(a, weight);
-            sums.1 += upper(b, weight);
+            let row = words(knots.get(j * stride..j * stride + 4)?.first_chunk()?);
+            // Below 2^31, as the weights add up to less than 2^16.
+            sums.0 += upper(along_u.applied_to(row.map(low)), weight);
+            sums.1 += upper(along_u.applied_to(row.map(high)), weight);
         }
         Some(sums)
     }

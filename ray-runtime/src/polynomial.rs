@@ -55,91 +55,32 @@ impl Mul for Dual {
     }
 }
 
-/// The polynomial of a total degree with these coefficients, and whatever stands behind them.
+/// The polynomial with these coefficients, as many as its total degree has: up to the ninth, written
+/// out, because the compiler unrolls one loop but not a loop of loops.
 ///
-/// A pair, because that comes back in registers. Where there are too few coefficients, those that are
-/// missing do not count: the size of a table is checked when it is opened.
-#[inline(always)]
-pub(crate) fn evaluate(coefficients: &[[f32; 2]], degree: u8, x: f32, y: f32) -> (f32, f32) {
-    let found = match degree {
-        3 => coefficients
-            .first_chunk()
-            .map(|all| cubic(all, x, y).into()),
-        5 => coefficients
-            .first_chunk()
-            .and_then(|all| fifth_degree(all, x, y)),
-        7 => coefficients
-            .first_chunk()
-            .and_then(|all| seventh_degree(all, x, y)),
-        _ => None,
-    };
-    found.unwrap_or_else(|| row_by_row(coefficients, degree, x, y))
-}
-
-/// [`evaluate`] in a loop, the same bits.
+/// A pair, because that comes back in registers.
 #[inline(never)]
-pub(crate) fn row_by_row<T: Number>(coefficients: &[[f32; 2]], degree: u8, x: T, y: T) -> (T, T) {
-    let Some(([first_a, first_b], mut rest)) = coefficients.split_first() else {
-        return (0.0.into(), 0.0.into());
+pub(crate) fn evaluate(coefficients: &[[f32; 2]], x: f32, y: f32) -> (f32, f32) {
+    let Some(([a, b], rest)) = coefficients.split_first() else {
+        return (0.0, 0.0);
     };
-    let (mut sum_a, mut sum_b) = (T::from(*first_a), T::from(*first_b));
-    for others in 1..=usize::from(degree) {
-        let Some(([a, b], after)) = rest.split_first() else {
-            break;
+    let (mut sum_a, mut sum_b) = (*a, *b);
+    // A polynomial of a lower degree is one that ends sooner.
+    macro_rules! rows {
+        ($rest:ident: $length:literal $($more:literal)*) => {
+            let Some((row, rest)) = $rest.split_first_chunk::<$length>() else {
+                return (sum_a, sum_b);
+            };
+            let (a, b) = along_x(row, x);
+            (sum_a, sum_b) = (sum_a * y + a, sum_b * y + b);
+            rows!(rest: $($more)*);
         };
-        let Some((row, after)) = after.split_at_checked(others) else {
-            break;
+        ($rest:ident:) => {
+            let _ = $rest;
         };
-        let (mut a, mut b) = (T::from(*a), T::from(*b));
-        for [next_a, next_b] in row {
-            a = a * x + (*next_a).into();
-            b = b * x + (*next_b).into();
-        }
-        (sum_a, sum_b) = (sum_a * y + a, sum_b * y + b);
-        rest = after;
     }
+    rows!(rest: 2 3 4 5 6 7 8 9 10);
     (sum_a, sum_b)
-}
-
-/// The rows of a polynomial, written out: the compiler unrolls one loop, but not a loop of loops.
-macro_rules! written_out {
-    ($coefficients:expr, $x:expr, $y:expr, $($length:literal)*) => {{
-        let ([a, b], rest) = $coefficients.split_first()?;
-        let (sum_a, sum_b) = (*a, *b);
-        $(
-            let (row, rest) = rest.split_first_chunk::<$length>()?;
-            let (a, b) = along_x(row, $x);
-            let (sum_a, sum_b) = (sum_a * $y + a, sum_b * $y + b);
-        )*
-        let _: &[[f32; 2]] = rest;
-        Some((sum_a, sum_b))
-    }};
-}
-
-/// [`evaluate`] of a degree up to 3. `None` if there are too few coefficients.
-#[inline(always)]
-pub(crate) fn up_to_cubic(
-    coefficients: &[[f32; 2]],
-    degree: u8,
-    x: f32,
-    y: f32,
-) -> Option<(f32, f32)> {
-    match degree {
-        0 => written_out!(coefficients, x, y,),
-        1 => written_out!(coefficients, x, y, 2),
-        2 => written_out!(coefficients, x, y, 2 3),
-        _ => written_out!(coefficients, x, y, 2 3 4),
-    }
-}
-
-#[inline(never)]
-fn fifth_degree(coefficients: &[[f32; 2]; 21], x: f32, y: f32) -> Option<(f32, f32)> {
-    written_out!(coefficients, x, y, 2 3 4 5 6)
-}
-
-#[inline(never)]
-fn seventh_degree(coefficients: &[[f32; 2]; 36], x: f32, y: f32) -> Option<(f32, f32)> {
-    written_out!(coefficients, x, y, 2 3 4 5 6 7 8)
 }
 
 /// One row.
@@ -151,6 +92,27 @@ fn along_x<const LENGTH: usize>(row: &[[f32; 2]; LENGTH], x: f32) -> (f32, f32) 
         b = b * x + next_b;
     }
     (a, b)
+}
+
+/// [`evaluate`] with derivatives, in a loop: for size, where that is for speed.
+#[inline(never)]
+pub(crate) fn evaluate_moving(coefficients: &[[f32; 2]], x: Dual, y: Dual) -> [Dual; 2] {
+    let mut sums = [Dual::from(0.0); 2];
+    let mut rest = coefficients;
+    let mut length = 1;
+    while let Some((row, after)) = rest.split_at_checked(length).filter(|_| !rest.is_empty()) {
+        for (k, sum) in sums.iter_mut().enumerate() {
+            let mut numbers = row
+                .iter()
+                .map(|pair| if k == 0 { pair[0] } else { pair[1] });
+            let first = Dual::from(numbers.next().unwrap_or(0.0));
+            let row = numbers.fold(first, |row, next| row * x + next.into());
+            *sum = if length == 1 { row } else { *sum * y + row };
+        }
+        rest = after;
+        length += 1;
+    }
+    sums
 }
 
 /// [`evaluate`] of a cubic, written out.
@@ -187,7 +149,7 @@ mod tests {
             for (k, (j, i)) in powers(degree).enumerate() {
                 let mut coefficients = [[0.0; 2]; coefficient_count(9)];
                 coefficients[k] = [1.0, -2.0];
-                let found = evaluate(&coefficients, degree as u8, x, y);
+                let found = evaluate(&coefficients[..coefficient_count(degree)], x, y);
                 // Powers of 3/4 and 1/2 up to the ninth fit 24 binary digits.
                 let expected = x.powi(i as i32) * y.powi(j as i32);
                 assert_eq!(found, (expected, -2.0 * expected), "{degree} {j} {i}");
@@ -197,14 +159,22 @@ mod tests {
 
     #[test]
     fn what_is_written_out_has_the_bits_of_the_loop() {
-        let coefficients: [[f32; 2]; 36] =
+        let coefficients: [[f32; 2]; 55] =
             core::array::from_fn(|k| [libm::sinf(k as f32 * 1.7), libm::cosf(k as f32 * 0.9)]);
         for k in 0..100 {
             let (x, y) = (k as f32 / 99.0, (k * 37 % 100) as f32 / 99.0);
-            for degree in [3, 5, 7] {
-                let (a, b) = evaluate(&coefficients, degree, x, y);
-                let (c, d) = row_by_row(&coefficients, degree, x, y);
-                assert_eq!([a, b].map(f32::to_bits), [c, d].map(f32::to_bits));
+            for degree in 0..=9 {
+                let coefficients = &coefficients[..coefficient_count(degree)];
+                let (a, b) = evaluate(coefficients, x, y);
+                let looped = evaluate_moving(coefficients, x.into(), y.into());
+                assert_eq!(
+                    looped.map(|sum| sum.value.to_bits()),
+                    [a, b].map(f32::to_bits)
+                );
+                if let Ok(ten) = coefficients.try_into() {
+                    let cubic = cubic(ten, x, y);
+                    assert_eq!(cubic.map(f32::to_bits), [a, b].map(f32::to_bits));
+                }
             }
         }
     }
@@ -214,11 +184,11 @@ mod tests {
         let coefficients: [[f32; 2]; 21] =
             core::array::from_fn(|k| [libm::sinf(k as f32 * 1.7), libm::cosf(k as f32 * 0.9)]);
         let (x, y) = (0.4, -0.7);
-        let at = |x: f32, y: f32| <[f32; 2]>::from(evaluate(&coefficients, 5, x, y));
+        let at = |x: f32, y: f32| <[f32; 2]>::from(evaluate(&coefficients, x, y));
         let dual = |value, by_u, by_v| Dual { value, by_u, by_v };
-        let (a, b) = row_by_row(&coefficients, 5, dual(x, 2.0, 0.0), dual(y, 0.0, 4.0));
+        let found = evaluate_moving(&coefficients, dual(x, 2.0, 0.0), dual(y, 0.0, 4.0));
         let h = 0.015625;
-        for (k, found) in [a, b].into_iter().enumerate() {
+        for (k, found) in found.into_iter().enumerate() {
             assert_eq!(found.value.to_bits(), at(x, y)[k].to_bits());
             // Central differences of degree 5: h^2 / 6 times third derivatives of up to 60, here 2e-3.
             let by_u = (at(x + h, y)[k] - at(x - h, y)[k]) / (2.0 * h);

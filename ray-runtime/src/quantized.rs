@@ -1,20 +1,18 @@
 //! A table of a polynomial and of quantized spline knots, borrowed from the blob.
 //!
-//! What is not inlined takes and gives its numbers in registers: pairs come back as tuples, and a
-//! number that is none stands for what is missing.
+//! What most tables are is written out in one function that calls no other; everything else is put
+//! together from parts.
 
 use crate::PixelPoint;
 use crate::format::{ALIGNMENT, QUANTIZED_HEADER_PAIRS, Record, coefficient_count, knots_len};
-use crate::knots::{Knot, Window};
+use crate::knots::Window;
 use crate::lookup::{self, Evaluated, Sample};
 use crate::polynomial::{self, Dual};
 use crate::weights::Weights;
 use crate::{LookupError, Ray};
 
 /// The ray of a pixel of the calibrated area, seen from the outer edge of the region.
-///
-/// Its arguments fit the registers, so that it takes the place of what calls it last, on the stack too.
-#[inline(never)]
+#[inline(always)]
 pub(crate) fn lookup(
     pairs: &[[f32; 2]],
     record: Record<'_>,
@@ -22,23 +20,36 @@ pub(crate) fn lookup(
 ) -> Result<Ray, LookupError> {
     // Nothing of this is missing in a blob that was opened: the sizes of its parts were checked.
     let table = Table::of(pairs, record).ok_or(LookupError::Outside)?;
-    let Some(polynomials) = table.usual_polynomials() else {
-        return lookup_any(pairs, record, from_edge);
-    };
-    let sample = table.usual_sample(polynomials, from_edge);
+    if table.is_usual() {
+        lookup_usual(table.pairs, record, from_edge)
+    } else {
+        lookup_any(table.pairs, record, from_edge)
+    }
+}
+
+/// The ray from a usual table, written out.
+///
+/// The arguments of this and of [`lookup_any`] fit the registers, so that they take the place of what
+/// calls them last, on the stack too.
+#[inline(never)]
+fn lookup_usual(
+    pairs: &[[f32; 2]],
+    record: Record<'_>,
+    from_edge: PixelPoint,
+) -> Result<Ray, LookupError> {
+    let sample = Table::starting(pairs, record).and_then(|table| table.usual_sample(from_edge));
     Ok(lookup::ray(record, sample.ok_or(LookupError::Outside)?))
 }
 
-/// [`lookup`] of any degrees and knots.
+/// The ray from any table.
 #[inline(never)]
 fn lookup_any(
     pairs: &[[f32; 2]],
     record: Record<'_>,
     from_edge: PixelPoint,
 ) -> Result<Ray, LookupError> {
-    let table = Table::of(pairs, record).ok_or(LookupError::Outside)?;
-    let sample = table.sample(from_edge).ok_or(LookupError::Outside)?;
-    Ok(lookup::ray(record, sample))
+    let sample = Table::starting(pairs, record).and_then(|table| table.sample(from_edge));
+    Ok(lookup::ray(record, sample.ok_or(LookupError::Outside)?))
 }
 
 /// The sample at a pixel of the region, with its derivatives by the pixel.
@@ -70,11 +81,10 @@ struct Table<'a> {
 /// One of a table's maps.
 #[derive(Clone, Copy)]
 struct Map<'a> {
-    degree: u8,
+    /// Bytes of a knot's number.
     number_len: u8,
     /// What a blend of knots counts.
     unit: f32,
-    /// And whatever follows them.
     coefficients: &'a [[f32; 2]],
     /// Pairs of the table before the knots.
     knots_start: usize,
@@ -87,7 +97,11 @@ impl<'a> Table<'a> {
     #[inline(always)]
     fn of(pairs: &'a [[f32; 2]], record: Record<'a>) -> Option<Self> {
         let start = (record.grid_offset() >> 3) as usize;
-        let pairs = pairs.get(start..)?;
+        Self::starting(pairs.get(start..)?, record)
+    }
+
+    #[inline(always)]
+    fn starting(pairs: &'a [[f32; 2]], record: Record<'a>) -> Option<Self> {
         Some(Self {
             record,
             pairs,
@@ -110,10 +124,9 @@ impl<'a> Table<'a> {
     fn direction(&self) -> Option<Map<'a>> {
         let [degree, number_len, ..] = self.kinds();
         Some(Map {
-            degree,
             number_len,
             unit: self.header[1][0],
-            coefficients: self.pairs.get(QUANTIZED_HEADER_PAIRS..)?,
+            coefficients: self.coefficients(QUANTIZED_HEADER_PAIRS, degree)?,
             knots_start: self.knots_start(),
         })
     }
@@ -123,12 +136,17 @@ impl<'a> Table<'a> {
         let start = QUANTIZED_HEADER_PAIRS + coefficient_count(direction_degree.into());
         let direction_knots = knots_len(self.record.cells(), direction_len).div_ceil(ALIGNMENT);
         Some(Map {
-            degree,
             number_len,
             unit: self.header[1][1],
-            coefficients: self.pairs.get(start..)?,
+            coefficients: self.coefficients(start, degree)?,
             knots_start: self.knots_start() + direction_knots,
         })
+    }
+
+    fn coefficients(&self, start: usize, degree: u8) -> Option<&'a [[f32; 2]]> {
+        self.pairs
+            .get(start..)?
+            .get(..coefficient_count(degree.into()))
     }
 
     /// The variables of the polynomials.
@@ -138,46 +156,40 @@ impl<'a> Table<'a> {
         (from_edge.u * scale_u - 1.0, from_edge.v * scale_v - 1.0)
     }
 
-    /// The polynomials of what most tables are: knots of i16 on a cubic and, unless the camera is
-    /// central, a polynomial of degree 3 at most for the offset. `None` of other tables.
+    /// Whether it is what most tables are: knots of i16 on a cubic and, unless the camera is central, a
+    /// cubic for the offset.
     #[inline(always)]
-    fn usual_polynomials(&self) -> Option<&'a [[f32; 2]; 2 * CUBIC]> {
-        let [degree, number_len, offset_degree, offset_number_len] = self.kinds();
-        if degree == 3 && number_len == 2 && offset_degree <= 3 && offset_number_len == 0 {
-            let (_, polynomials) = self
-                .pairs
-                .first_chunk::<{ QUANTIZED_HEADER_PAIRS + 2 * CUBIC }>()?
-                .split_first_chunk::<QUANTIZED_HEADER_PAIRS>()?;
-            polynomials.first_chunk()
+    fn is_usual(&self) -> bool {
+        let kinds = if self.record.is_central() {
+            [3, 2, 0, 0]
         } else {
-            None
-        }
+            [3, 2, 3, 0]
+        };
+        self.header[0][0].to_bits() == u32::from_le_bytes(kinds)
     }
 
-    /// The sample of such a table at a pixel, written out.
+    /// The sample of such a table at a pixel.
     #[inline(always)]
-    fn usual_sample(
-        &self,
-        polynomials: &[[f32; 2]; 2 * CUBIC],
-        from_edge: PixelPoint,
-    ) -> Option<Sample<f32>> {
-        let (direction, offset) = polynomials.split_first_chunk()?;
-        let left = self.blend::<f32>(self.knots_start(), from_edge)?;
+    fn usual_sample(&self, from_edge: PixelPoint) -> Option<Sample<f32>> {
+        let (_, coefficients) = self.pairs.split_first_chunk::<QUANTIZED_HEADER_PAIRS>()?;
+        let (direction, rest) = coefficients.split_first_chunk::<CUBIC>()?;
+        let window = Window::at(self.record, self.header[3], from_edge);
+        let along = window.shares.map(Weights::at);
+        let left = window.blend_words(self.pairs, self.knots_start(), along)?;
         let (x, y) = self.variables(from_edge);
         let [a, b] = polynomial::cubic(direction, x, y);
         let unit = self.header[1][0];
-        let [_, _, offset_degree, _] = self.kinds();
-        Some(Sample {
-            s: [a + unit * left.0, b + unit * left.1],
-            n: if self.record.is_central() {
-                [0.0; 2]
-            } else {
-                polynomial::up_to_cubic(offset, offset_degree, x, y)?.into()
-            },
-        })
+        let s = [a + unit * left.0 as f32, b + unit * left.1 as f32];
+        let n = if self.record.is_central() {
+            [0.0; 2]
+        } else {
+            polynomial::cubic(rest.first_chunk()?, x, y)
+        };
+        Some(Sample { s, n })
     }
 
     /// The sample at a pixel.
+    #[inline(always)]
     fn sample(&self, from_edge: PixelPoint) -> Option<Sample<f32>> {
         let s = self.value(self.direction()?, from_edge)?;
         let n = if self.record.is_central() {
@@ -190,30 +202,21 @@ impl<'a> Table<'a> {
 
     fn value(&self, map: Map<'_>, from_edge: PixelPoint) -> Option<[f32; 2]> {
         let (x, y) = self.variables(from_edge);
-        let (a, b) = polynomial::evaluate(map.coefficients, map.degree, x, y);
-        let left = match map.number_len {
-            0 => return Some([a, b]),
-            1 => self.blend::<[i8; 2]>(map.knots_start, from_edge)?,
-            _ => self.blend::<f32>(map.knots_start, from_edge)?,
-        };
-        Some([a + map.unit * left.0, b + map.unit * left.1])
-    }
-
-    /// The knots' blend at a pixel, in units.
-    #[inline(always)]
-    fn blend<K: Knot>(&self, knots_start: usize, from_edge: PixelPoint) -> Option<(f32, f32)> {
+        let (a, b) = polynomial::evaluate(map.coefficients, x, y);
+        if map.number_len == 0 {
+            return Some([a, b]);
+        }
         let window = Window::at(self.record, self.header[3], from_edge);
-        let [along_u, along_v] = window.shares.map(Weights::at);
-        let (a, b) = window.blend::<K>(self.pairs, knots_start, along_u, along_v)?;
-        Some((a as f32, b as f32))
+        let along = window.shares.map(Weights::at);
+        let left = window.blend(self.pairs, map.knots_start, map.number_len, along)?;
+        Some([a + map.unit * left.0 as f32, b + map.unit * left.1 as f32])
     }
 
     fn value_moving(&self, map: Map<'_>, from_edge: PixelPoint) -> Option<[Dual; 2]> {
         let (x, y) = self.variables(from_edge);
         let [scale_u, scale_v] = self.header[2];
         let (x, y) = (Dual::along_u(x, scale_u), Dual::along_v(y, scale_v));
-        let (a, b) = polynomial::row_by_row(map.coefficients, map.degree, x, y);
-        let mut sums = [a, b];
+        let mut sums = polynomial::evaluate_moving(map.coefficients, x, y);
         if map.number_len == 0 {
             return Some(sums);
         }
@@ -222,17 +225,12 @@ impl<'a> Table<'a> {
         let [slope_u, slope_v] = window.shares.map(Weights::half_slopes);
         let per_px = [self.record.axis_u(), self.record.axis_v()].map(|axis| axis.cells_per_px);
         let ways = [
-            (value_u, value_v, map.unit),
-            (slope_u, value_v, map.unit * (2.0 * per_px[0])),
-            (value_u, slope_v, map.unit * (2.0 * per_px[1])),
+            ([value_u, value_v], map.unit),
+            ([slope_u, value_v], map.unit * (2.0 * per_px[0])),
+            ([value_u, slope_v], map.unit * (2.0 * per_px[1])),
         ];
-        for (way, (along_u, along_v, unit)) in ways.into_iter().enumerate() {
-            let blend = if map.number_len == 1 {
-                Window::blend::<[i8; 2]>
-            } else {
-                Window::blend::<f32>
-            };
-            let left = blend(&window, self.pairs, map.knots_start, along_u, along_v)?;
+        for (way, (along, unit)) in ways.into_iter().enumerate() {
+            let left = window.blend(self.pairs, map.knots_start, map.number_len, along)?;
             for (sum, left) in sums.iter_mut().zip([left.0, left.1]) {
                 let part = match way {
                     0 => &mut sum.value,
