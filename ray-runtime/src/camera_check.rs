@@ -132,6 +132,7 @@ impl CameraCheck<'_> {
     }
 
     /// Checks that the f32 from one byte to another, multiples of 8, are there and moderate.
+    #[inline(never)]
     fn check_numbers(&self, start: usize, end: usize) -> Result<(), OpenError> {
         let pairs = self
             .views

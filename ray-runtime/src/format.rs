@@ -7,12 +7,14 @@
 
 mod axis;
 mod encoding;
+mod message;
 mod pair;
 mod quantized;
 mod record;
 
 pub use axis::Axis;
 pub use encoding::{Encoding, Form, PATCH_LEN, coefficient_count};
+pub(crate) use message::Messages;
 pub use pair::{MAX_NODES, MAX_STEP_PX, NODE_LEN, PAIR_HEADER_LEN, PairHeader, TRIANGLE};
 pub use quantized::{
     MAX_DEGREE, PLACES_PER_CELL, QUANTIZED_HEADER_LEN, QuantizedHeader, QuantizedLayout,
