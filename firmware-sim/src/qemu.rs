@@ -218,6 +218,20 @@ pub fn build_soft_float_image(image: &str) -> Result<PathBuf, QemuError> {
     Ok(image_of(SOFT_FLOAT_TARGET, image))
 }
 
+/// Builds the image of this name without what reads blobs of old versions, and returns where it is.
+///
+/// # Errors
+/// As [`build_image`].
+pub fn build_newest_only_image(image: &str) -> Result<PathBuf, QemuError> {
+    let folder = root().join("target/embedded/newest-only");
+    let folder_argument = folder.display().to_string();
+    build(
+        &[image],
+        &["--no-default-features", "--target-dir", &folder_argument],
+    )?;
+    Ok(folder.join(TARGET).join("release").join(image))
+}
+
 /// Builds the images of these names if they are missing or stale, in one go.
 ///
 /// # Errors
@@ -226,7 +240,7 @@ pub fn build_images(images: &[&str]) -> Result<(), QemuError> {
     build(images, &[])
 }
 
-fn build(images: &[&str], target: &[&str]) -> Result<(), QemuError> {
+fn build(images: &[&str], options: &[&str]) -> Result<(), QemuError> {
     let root = root();
     let script = root.join("scripts/embedded-cargo.sh");
     if !script.is_file() {
@@ -236,7 +250,7 @@ fn build(images: &[&str], target: &[&str]) -> Result<(), QemuError> {
     }
     let status = Command::new(&script)
         .args(["build", "--quiet", "--locked", "--release"])
-        .args(target)
+        .args(options)
         .args(images.iter().flat_map(|image| ["--bin", image]))
         .stdin(Stdio::null())
         .stdout(std::io::stderr())
