@@ -196,9 +196,8 @@ impl<'a> RayBlob<'a> {
         b: (usize, PixelPoint),
     ) -> Result<Triangulation, MeasureError> {
         // By reference: a ray that is passed on as a result of its own is copied word by word.
-        let (ray_a, ray_b);
-        ray_a = self.lookup(a.0, a.1);
-        ray_b = self.lookup(b.0, b.1);
+        let ray_a = self.lookup(a.0, a.1);
+        let ray_b = self.lookup(b.0, b.1);
         match (&ray_a, &ray_b) {
             (Ok(ray_a), Ok(ray_b)) => triangulate::triangulate_pair(ray_a, ray_b),
             (Err(error), _) => Err(MeasureError::of_lookup(*error, a.0)),

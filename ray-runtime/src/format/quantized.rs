@@ -70,16 +70,15 @@ impl QuantizedHeader {
         cells: [u32; 2],
     ) -> Self {
         let direction_end = QUANTIZED_HEADER_LEN + coefficients_len(direction);
-        let (offset, knots_start) = match offset {
-            Some(offset) => (offset, direction_end + coefficients_len(offset)),
-            None => {
-                let none = QuantizedMap {
-                    degree: 0,
-                    number_len: 0,
-                    unit: 0.0,
-                };
-                (none, direction_end)
-            }
+        let (offset, knots_start) = if let Some(offset) = offset {
+            (offset, direction_end + coefficients_len(offset))
+        } else {
+            let none = QuantizedMap {
+                degree: 0,
+                number_len: 0,
+                unit: 0.0,
+            };
+            (none, direction_end)
         };
         Self {
             direction,
