@@ -13,6 +13,7 @@ use calib_offline::geometry::{PixelPoint, RigidTransform, SensorSize};
 use calib_offline::pack::{AlignedBytes, PackSettings, Prefer, pack, read_aligned};
 use nalgebra::{Matrix3, Matrix4, Vector2, Vector3};
 use ray_runtime::RayBlob;
+use ray_runtime::format::{self, HEADER_LEN, Header, QuantizedHeader, RECORD_LEN};
 use std::path::Path;
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../data/golden");
@@ -113,6 +114,44 @@ fn the_packer_still_writes_the_golden_blobs() {
         still_writes(rig, &format!("{name}-v3-small.rays"), Prefer::Size);
         still_writes(rig, &format!("{name}-v3-fast.rays"), Prefer::Speed);
     }
+    let cubic = "non-central-v3-cubic.rays";
+    still_writes(&cubic_rig(), cubic, Prefer::Size);
+    let bytes = read_aligned(&Path::new(FOLDER).join(cubic)).unwrap();
+    for table in quantized_tables(&bytes) {
+        let (direction, offset) = (table.direction, table.offset);
+        assert_eq!((direction.degree, direction.number_len), (3, 2));
+        assert_eq!((offset.degree, offset.number_len), (3, 0));
+    }
+}
+
+/// Two cameras as the small form has most of them: knots on a cubic, and a cubic offset.
+fn cubic_rig() -> Rig {
+    let mut rig = golden_rig();
+    let mut field = rig.cameras[0].field.clone();
+    let mut offset = SmoothMap::zero(3);
+    for (k, c) in offset.polynomial.coefficients.iter_mut().enumerate() {
+        *c = Vector2::new(0.5 - k as f64 / 8.0, k as f64 / 16.0) / 64.0;
+    }
+    field.offset = Some(offset);
+    for camera in &mut rig.cameras {
+        camera.field = field.clone();
+    }
+    rig
+}
+
+/// The headers of a blob's tables, all of which are quantized.
+fn quantized_tables(bytes: &[u8]) -> Vec<QuantizedHeader> {
+    let (_, header) = Header::read(bytes).unwrap();
+    let records = format::aligned(HEADER_LEN + header.meta_len as usize);
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+    (0..usize::from(header.camera_count))
+        .map(|camera| {
+            // The table's place is the sixth word of a record.
+            let start = word(records + camera * RECORD_LEN + 20) as usize;
+            let pair = |k: usize| [8 * k, 8 * k + 4].map(|at| f32::from_bits(word(start + at)));
+            QuantizedHeader::read(&[0, 1, 2, 3, 4].map(pair)).unwrap()
+        })
+        .collect()
 }
 
 fn still_writes(rig: &Rig, name: &str, prefer: Prefer) {

@@ -12,6 +12,7 @@ mod report;
 mod stack;
 mod text;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
@@ -155,6 +156,7 @@ pub fn measure(paths: &[PathBuf]) -> Result<Cost, CostError> {
     for (path, asked) in paths.iter().zip(&asked) {
         blobs.push(cost_of_blob(&counting, path, asked, &mut conditions)?);
     }
+    let newest_only = Image::read(&qemu::build_newest_only_image(IMAGES[0].0)?)?;
     let images = IMAGES
         .iter()
         .map(|(name, does, functions)| image_cost(name, does, functions))
@@ -164,6 +166,7 @@ pub fn measure(paths: &[PathBuf]) -> Result<Cost, CostError> {
         conditions,
         blobs,
         images,
+        newest_only_code_bytes: runtime_code_bytes(&newest_only.code_by_origin()),
     })
 }
 
@@ -175,6 +178,14 @@ pub fn panics_in(image: &Path) -> Result<Vec<String>, CostError> {
     Ok(Image::read(image)?.panics())
 }
 
+/// Of an image that calls the runtime and does nothing else.
+fn runtime_code_bytes(code_by_origin: &BTreeMap<String, u64>) -> u64 {
+    let of_runtime = code_by_origin
+        .iter()
+        .filter(|(origin, _)| *origin != image::STARTUP);
+    of_runtime.map(|(_, bytes)| bytes).sum()
+}
+
 fn image_cost(
     name: &'static str,
     does: &'static str,
@@ -183,11 +194,7 @@ fn image_cost(
     let image = Image::read(&qemu::image_path(name))?;
     let code_by_origin = image.code_by_origin();
     let calls_runtime_alone = functions != [image::RESET];
-    let is_runtime = |origin: &str| origin != image::STARTUP;
-    let of_runtime = code_by_origin
-        .iter()
-        .filter(|(origin, _)| is_runtime(origin));
-    let runtime_code_bytes = of_runtime.map(|(_, bytes)| bytes).sum();
+    let runtime_code_bytes = runtime_code_bytes(&code_by_origin);
     let bound = |function: &&'static str| (*function, image.stack_bound(name, function));
     Ok(ImageCost {
         image: name,

@@ -251,6 +251,21 @@ pub fn build_soft_float_image(image: &str) -> Result<PathBuf, QemuError> {
     Ok(image_of(SOFT_FLOAT_TARGET, image))
 }
 
+/// Builds the image of this name without what reads blobs of old versions, and returns where it is.
+///
+/// # Errors
+/// As [`build_image`].
+pub fn build_newest_only_image(image: &str) -> Result<PathBuf, QemuError> {
+    let folder = root().join("target/embedded/newest-only");
+    let folder_argument = folder.display().to_string();
+    build(
+        &[image],
+        &["--no-default-features", "--target-dir", &folder_argument],
+        &[],
+    )?;
+    Ok(folder.join(TARGET).join("release").join(image))
+}
+
 /// Builds the images of these names if they are missing or stale, in one go.
 ///
 /// # Errors

@@ -7,7 +7,7 @@ use crate::check::{
     recognized_header,
 };
 use crate::format::{
-    self, ALIGNMENT, CameraMeta, HEADER_LEN, IDENTITY_LEN, Meta, PairHeader, RECORD_LEN,
+    self, ALIGNMENT, CameraMeta, HEADER_LEN, IDENTITY_LEN, Messages, PairHeader, RECORD_LEN,
     RECORD_WORDS, Record,
 };
 use crate::lookup::Views;
@@ -22,15 +22,13 @@ use crate::{LookupError, MeasureError, OpenError, PixelPoint, Ray, lookup};
 /// other check than whether the pixel is in the calibrated area.
 #[derive(Debug, Clone, Copy)]
 pub struct RayBlob<'a> {
-    bytes: &'a [u8],
-    /// The same bytes as pairs of numbers.
-    pairs: &'a [[f32; 2]],
+    views: Views<'a>,
     records: &'a [[u32; RECORD_WORDS]],
     identity: &'a [u8; IDENTITY_LEN],
     frame: &'a str,
     written_by: &'a str,
-    camera_meta: &'a [u8],
-    self_test_bytes: &'a [u8],
+    camera_meta: Messages<'a>,
+    self_tests: Messages<'a>,
     self_test_count: u16,
     pair_bytes: &'a [u8],
     max_error_px: f32,
@@ -67,17 +65,16 @@ impl<'a> RayBlob<'a> {
         let records = bytemuck::try_cast_slice(records).map_err(|_| OpenError::BadHeader)?;
         check_padding(bytes, meta_end, records_start)?;
 
-        let (meta, camera_meta) =
-            postcard::take_from_bytes::<Meta<'a>>(meta_bytes).map_err(|_| OpenError::BadMeta)?;
+        let mut messages = Messages { rest: meta_bytes };
+        let meta = messages.meta().ok_or(OpenError::BadMeta)?;
         let blob = Self {
-            bytes,
-            pairs,
+            views: Views { bytes, pairs },
             records,
             identity: meta.identity.try_into().map_err(|_| OpenError::BadMeta)?,
             frame: meta.frame,
             written_by: meta.written_by,
-            camera_meta,
-            self_test_bytes: &[],
+            camera_meta: messages,
+            self_tests: Messages { rest: &[] },
             self_test_count: meta.self_test_count,
             pair_bytes: &[],
             max_error_px: meta.max_error_px,
@@ -87,16 +84,16 @@ impl<'a> RayBlob<'a> {
         if !(is_positive(meta.max_error_px) && is_positive(meta.working_distance_mm)) {
             return Err(OpenError::BadMeta);
         }
-        let (self_test_bytes, pairs_start) = blob.check_cameras(tables_start, header.version)?;
+        let (self_tests, pairs_start) = blob.check_cameras(tables_start, header.version)?;
         let pair_bytes = bytes.get(pairs_start..).ok_or(OpenError::BadHeader)?;
         check_pairs(bytes, pairs_start, header.pair_count, header.camera_count)?;
         let blob = Self {
-            self_test_bytes,
+            self_tests,
             pair_bytes,
             ..blob
         };
         check_self_tests(
-            self_test_bytes,
+            self_tests,
             meta.self_test_count,
             header.camera_count,
             |cameras| blob.pair(cameras.map(usize::from)).is_some(),
@@ -159,18 +156,18 @@ impl<'a> RayBlob<'a> {
 
     /// Length of the blob, bytes.
     pub const fn len(&self) -> usize {
-        self.bytes.len()
+        self.views.bytes.len()
     }
 
     /// Whether the blob has no bytes: never.
     pub const fn is_empty(&self) -> bool {
-        self.bytes.is_empty()
+        self.views.bytes.is_empty()
     }
 
     /// Questions whose answers' bits are known.
     pub const fn self_tests(&self) -> SelfTests<'a> {
         SelfTests {
-            bytes: self.self_test_bytes,
+            messages: self.self_tests,
             left: self.self_test_count,
         }
     }
@@ -186,7 +183,7 @@ impl<'a> RayBlob<'a> {
     /// Whether the pixel of a camera has a ray.
     pub fn is_calibrated(&self, camera: usize, pixel: PixelPoint) -> bool {
         self.record(camera)
-            .is_ok_and(|record| lookup::is_calibrated(self.bytes, record, pixel))
+            .is_ok_and(|record| lookup::is_calibrated(self.views.bytes, record, pixel))
     }
 
     /// The point that two cameras see: the midpoint of the common perpendicular of their rays.
@@ -199,8 +196,9 @@ impl<'a> RayBlob<'a> {
         b: (usize, PixelPoint),
     ) -> Result<Triangulation, MeasureError> {
         // By reference: a ray that is passed on as a result of its own is copied word by word.
-        let rays = (self.lookup(a.0, a.1), self.lookup(b.0, b.1));
-        match (&rays.0, &rays.1) {
+        let ray_a = self.lookup(a.0, a.1);
+        let ray_b = self.lookup(b.0, b.1);
+        match (&ray_a, &ray_b) {
             (Ok(ray_a), Ok(ray_b)) => triangulate::triangulate_pair(ray_a, ray_b),
             (Err(error), _) => Err(MeasureError::of_lookup(*error, a.0)),
             (_, Err(error)) => Err(MeasureError::of_lookup(*error, b.0)),
@@ -282,7 +280,7 @@ impl<'a> RayBlob<'a> {
     ) -> Result<lookup::MovingRay, MeasureError> {
         self.record(camera)
             .and_then(|record| {
-                if lookup::is_calibrated(self.bytes, record, pixel) {
+                if lookup::is_calibrated(self.views.bytes, record, pixel) {
                     self.views().lookup_moving(record, pixel)
                 } else {
                     Err(LookupError::Outside)
@@ -310,10 +308,7 @@ impl<'a> RayBlob<'a> {
     }
 
     pub(crate) const fn views(&self) -> Views<'a> {
-        Views {
-            bytes: self.bytes,
-            pairs: self.pairs,
-        }
+        self.views
     }
 
     pub(crate) fn record(&self, camera: usize) -> Result<Record<'a>, LookupError> {
@@ -327,12 +322,8 @@ impl<'a> RayBlob<'a> {
     }
 
     fn camera_metas(&self) -> impl Iterator<Item = CameraMeta<'a>> {
-        let mut rest = self.camera_meta;
-        self.records.iter().map_while(move |_| {
-            let (meta, after) = postcard::take_from_bytes(rest).ok()?;
-            rest = after;
-            Some(meta)
-        })
+        let mut messages = self.camera_meta;
+        self.records.iter().map_while(move |_| messages.camera())
     }
 
     /// Checks every camera and its tables; what is left of the metadata behind the cameras, and
@@ -341,13 +332,11 @@ impl<'a> RayBlob<'a> {
         &self,
         tables_start: usize,
         version: u16,
-    ) -> Result<(&'a [u8], usize), OpenError> {
-        let mut rest = self.camera_meta;
+    ) -> Result<(Messages<'a>, usize), OpenError> {
+        let mut messages = self.camera_meta;
         let mut end = tables_start;
         for (camera, words) in self.records.iter().enumerate() {
-            let (meta, after) = postcard::take_from_bytes::<CameraMeta<'a>>(rest)
-                .map_err(|_| OpenError::BadMeta)?;
-            rest = after;
+            let meta = messages.camera().ok_or(OpenError::BadMeta)?;
             let is_first = self.camera_index(meta.name) == Some(camera);
             if meta.name.is_empty() || !is_first || !is_region_on_sensor(&meta) {
                 return Err(OpenError::BadMeta);
@@ -360,6 +349,6 @@ impl<'a> RayBlob<'a> {
             };
             end = check.run(&meta, end)?;
         }
-        Ok((rest, end))
+        Ok((messages, end))
     }
 }

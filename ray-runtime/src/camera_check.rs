@@ -4,7 +4,8 @@ use crate::OpenError;
 use crate::check::{check_padding, is_moderate, is_rotation, same_bits};
 use crate::error::Table;
 use crate::format::{
-    self, Axis, CameraMeta, Encoding, MAX_CELLS, MAX_DEGREE, QuantizedHeader, QuantizedMap, Record,
+    self, Axis, CameraMeta, Encoding, MAX_CELLS, MAX_DEGREE, QUANTIZED_HEADER_LEN, QuantizedHeader,
+    QuantizedMap, Record,
 };
 use crate::lookup::Views;
 
@@ -24,7 +25,7 @@ impl CameraCheck<'_> {
     pub fn run(&self, meta: &CameraMeta<'_>, start: usize) -> Result<usize, OpenError> {
         let (record, bytes) = (self.record, self.views.bytes);
         let encoding = Encoding::from_number(record.encoding())
-            .filter(|encoding| encoding.since_version() <= self.version)
+            .filter(|encoding| encoding.since_version() <= self.version && encoding.is_read())
             .ok_or(OpenError::UnknownEncoding {
                 camera: self.camera,
                 found: record.encoding(),
@@ -90,46 +91,48 @@ impl CameraCheck<'_> {
             .get(start >> 3..)
             .and_then(QuantizedHeader::read)
             .ok_or(self.layout(Table::Grid))?;
-        let (direction, offset) = (header.direction, header.offset);
+        let QuantizedHeader {
+            direction, offset, ..
+        } = header;
         let is_map = |map: QuantizedMap| map.degree <= MAX_DEGREE && map.number_len <= 2;
-        if !(is_map(direction) && is_map(offset)) {
+        // Bits, as those of a zero count too.
+        let is_absent =
+            |map: QuantizedMap| map.degree == 0 && map.number_len == 0 && map.unit.to_bits() == 0;
+        let (is_central, cells) = (encoding.is_central, self.record.cells());
+        if !(is_map(direction) && is_map(offset) && (!is_central || is_absent(offset))) {
             return Err(self.layout(Table::Grid));
         }
         let extent_px = [meta.region_width, meta.region_height];
-        let second = (!encoding.is_central).then_some(offset);
-        let (expected, len) =
-            QuantizedHeader::new(direction, second, extent_px, self.record.cells());
-        let starts = |map: QuantizedMap| [map.coefficients_start, map.knots_start];
-        let is_placed = starts(direction) == starts(expected.direction)
-            && starts(offset) == starts(expected.offset)
-            && (second.is_some() || offset == QuantizedMap::default());
-        if !is_placed {
+        let second = (!is_central).then_some(offset);
+        let expected = QuantizedHeader::new(direction, second, extent_px, cells);
+        if header.knots_start != expected.knots_start {
             return Err(self.layout(Table::Grid));
         }
-        let is_step = |map: QuantizedMap| map.step >= 0.0 && is_moderate(map.step);
-        if !(header.scale == expected.scale && is_step(direction) && is_step(offset)) {
+        let is_unit = |map: QuantizedMap| map.unit >= 0.0 && is_moderate(map.unit);
+        if !(header.scale == expected.scale
+            && header.places_per_px == expected.places_per_px
+            && is_unit(direction)
+            && is_unit(offset))
+        {
             return Err(self.number(Table::Grid));
         }
-        let at = |place: u32| start.saturating_add(place as usize);
-        self.check_numbers(at(direction.coefficients_start), at(direction.knots_start))?;
-        if let Some(offset) = second {
-            self.check_numbers(at(offset.coefficients_start), at(offset.knots_start))?;
-            // Between the parts of the two maps.
-            let (_, used) = QuantizedHeader::new(direction, None, extent_px, self.record.cells());
-            check_padding(
-                self.views.bytes,
-                start.saturating_add(used),
-                at(offset.coefficients_start),
-            )?;
-        }
-        let end = start.saturating_add(len);
+        let layout = header.layout(cells);
+        let at = |place: usize| start.saturating_add(place);
+        self.check_numbers(at(QUANTIZED_HEADER_LEN), at(layout.direction_knots))?;
+        let end = at(layout.offset_knots_end);
         if self.views.bytes.len() < end {
             return Err(self.layout(Table::Grid));
         }
+        check_padding(
+            self.views.bytes,
+            at(layout.direction_knots_end),
+            at(layout.offset_knots),
+        )?;
         Ok(end)
     }
 
     /// Checks that the f32 from one byte to another, multiples of 8, are there and moderate.
+    #[inline(never)]
     fn check_numbers(&self, start: usize, end: usize) -> Result<(), OpenError> {
         let pairs = self
             .views

@@ -3,7 +3,7 @@
 use crate::OpenError;
 use crate::format::{
     self, ALIGNMENT, Axis, CameraMeta, HEADER_LEN, Header, MAGIC, MAX_CAMERAS, MAX_EXTENT_PX,
-    MAX_MAGNITUDE, OLDEST_VERSION, SelfTest, VERSION,
+    MAX_MAGNITUDE, Messages, OLDEST_VERSION, SelfTest, VERSION,
 };
 use crate::uncertainty::Pair;
 
@@ -48,7 +48,7 @@ pub(crate) fn checked_header(bytes: &[u8]) -> Result<Header, OpenError> {
         });
     }
     if usize::from(header.header_len) != HEADER_LEN
-        || (header.version == OLDEST_VERSION && header.pair_count != 0)
+        || (header.version == 1 && header.pair_count != 0)
         || !bytes.len().is_multiple_of(ALIGNMENT)
         || !(1..=MAX_CAMERAS).contains(&header.camera_count)
     {
@@ -58,6 +58,7 @@ pub(crate) fn checked_header(bytes: &[u8]) -> Result<Header, OpenError> {
 }
 
 /// Checks that the bytes from `start` to `end` are there and zero.
+#[inline(never)]
 pub(crate) fn check_padding(bytes: &[u8], start: usize, end: usize) -> Result<(), OpenError> {
     bytes
         .get(start..end)
@@ -99,16 +100,13 @@ pub(crate) fn check_pairs(
 /// Checks that there are as many self-tests as stated, of cameras that exist and of pairs whose
 /// uncertainty is known where they ask for it, and nothing else.
 pub(crate) fn check_self_tests(
-    bytes: &[u8],
+    mut messages: Messages<'_>,
     count: u16,
     camera_count: u16,
     is_known_pair: impl Fn([u16; 2]) -> bool,
 ) -> Result<(), OpenError> {
-    let mut rest = bytes;
     for _ in 0..count {
-        let (test, after) =
-            postcard::take_from_bytes::<SelfTest>(rest).map_err(|_| OpenError::BadMeta)?;
-        rest = after;
+        let test = messages.self_test().ok_or(OpenError::BadMeta)?;
         let has_cameras = match test {
             SelfTest::Ray { camera, .. } => camera < camera_count,
             SelfTest::Pair { cameras, .. } => cameras.iter().all(|c| *c < camera_count),
@@ -118,7 +116,7 @@ pub(crate) fn check_self_tests(
             return Err(OpenError::BadMeta);
         }
     }
-    if rest.is_empty() {
+    if messages.rest.is_empty() {
         Ok(())
     } else {
         Err(OpenError::BadMeta)

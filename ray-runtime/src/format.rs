@@ -7,14 +7,20 @@
 
 mod axis;
 mod encoding;
+mod message;
 mod pair;
 mod quantized;
 mod record;
 
 pub use axis::Axis;
 pub use encoding::{Encoding, Form, PATCH_LEN, coefficient_count};
+pub(crate) use message::Messages;
 pub use pair::{MAX_NODES, MAX_STEP_PX, NODE_LEN, PAIR_HEADER_LEN, PairHeader, TRIANGLE};
-pub use quantized::{MAX_DEGREE, QUANTIZED_HEADER_LEN, QuantizedHeader, QuantizedMap};
+pub use quantized::{
+    MAX_DEGREE, PLACES_PER_CELL, QUANTIZED_HEADER_LEN, QuantizedHeader, QuantizedLayout,
+    QuantizedMap, UNITS_PER_STEP, places_per_px,
+};
+pub(crate) use quantized::{QUANTIZED_HEADER_PAIRS, knots_len};
 pub use record::{RECORD_LEN, RECORD_WORDS, Record, RecordFields};
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
@@ -24,9 +30,9 @@ use serde::{Deserialize, Serialize};
 pub const MAGIC: [u8; 4] = *b"RAYS";
 /// The format version that the packer writes and the newest that this library reads.
 pub const VERSION: u16 = 3;
-/// The oldest version that this library reads. Version 2 has no other [`Form`] than splines, version 1
-/// besides that no [`PairHeader`].
-pub const OLDEST_VERSION: u16 = 1;
+/// The oldest version that this library reads: without the feature `old-versions`, the newest.
+/// Version 2 has no other [`Form`] than splines, version 1 besides that no [`PairHeader`].
+pub const OLDEST_VERSION: u16 = if cfg!(feature = "old-versions") { 1 } else { 3 };
 /// Length of the header of all versions.
 pub const HEADER_LEN: usize = 24;
 /// Every part after the metadata starts on a multiple of this.

@@ -15,14 +15,6 @@ pub(crate) struct Place {
     pub weights: [f32; 3],
 }
 
-impl Place {
-    /// The weights of all four knots.
-    pub(crate) fn of_all(self) -> [f32; 4] {
-        let [a, c, d] = self.weights;
-        [a, 1.0 - a - c - d, c, d]
-    }
-}
-
 impl Axis {
     /// Whether the coordinate lies between the region's outer edges; NaN does not.
     ///

@@ -17,6 +17,7 @@ mod check;
 mod error;
 pub mod format;
 mod grid;
+mod knots;
 mod lookup;
 mod polynomial;
 mod project;
@@ -27,6 +28,7 @@ mod sensor_window;
 mod spline;
 mod triangulate;
 mod uncertainty;
+mod weights;
 
 pub use aligned::Aligned;
 pub use blob::RayBlob;

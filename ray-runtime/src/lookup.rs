@@ -1,9 +1,9 @@
 //! A pixel's ray from a camera's table.
 
-use crate::format::{Encoding, Form, Record};
+use crate::format::{Encoding, Form, OLDEST_VERSION, Record};
 use crate::polynomial::{self, Dual, Number};
 use crate::quantized;
-use crate::spline::{Knots, Window};
+use crate::spline;
 use crate::{LookupError, PixelPoint, Ray};
 use nalgebra::Vector3;
 
@@ -27,8 +27,8 @@ pub(crate) trait Evaluated: Number {
     fn along_u(value: f32, per_px: f32) -> Self;
     /// A coordinate that grows with v at a rate, 1/px.
     fn along_v(value: f32, per_px: f32) -> Self;
-    /// The spline at the window.
-    fn blend(window: &Window<'_>, knots: Knots<'_>) -> Option<[Self; 2]>;
+    /// The spline of f32 knots at the window.
+    fn blend(window: &spline::Window<'_>, knots: spline::Knots<'_>) -> Option<[Self; 2]>;
 }
 
 impl Evaluated for f32 {
@@ -41,7 +41,7 @@ impl Evaluated for f32 {
     }
 
     #[inline(always)]
-    fn blend(window: &Window<'_>, knots: Knots<'_>) -> Option<[Self; 2]> {
+    fn blend(window: &spline::Window<'_>, knots: spline::Knots<'_>) -> Option<[Self; 2]> {
         window.blend(knots)
     }
 }
@@ -63,7 +63,7 @@ impl Evaluated for Dual {
         }
     }
 
-    fn blend(window: &Window<'_>, knots: Knots<'_>) -> Option<[Self; 2]> {
+    fn blend(window: &spline::Window<'_>, knots: spline::Knots<'_>) -> Option<[Self; 2]> {
         window.blend_moving(knots)
     }
 }
@@ -93,28 +93,9 @@ impl Views<'_> {
                 let [s, n] = self.patch::<2, f32>(record, pixel)?;
                 Ok(shifted_ray(record, Sample { s, n }))
             }
-            _ => self.lookup_other(record, pixel),
+            _ if is_spline(record) => lookup_spline(self.pairs, record, pixel),
+            _ => quantized::lookup(self.pairs, record, from_edge(record, pixel)),
         }
-    }
-
-    /// The same of other forms than patches.
-    #[inline(never)]
-    fn lookup_other(self, record: Record<'_>, pixel: PixelPoint) -> Result<Ray, LookupError> {
-        let sample = self.sample_other(record, pixel)?;
-        Ok(ray(record, sample))
-    }
-
-    #[inline(always)]
-    fn sample_other<T: Evaluated>(
-        self,
-        record: Record<'_>,
-        pixel: PixelPoint,
-    ) -> Result<Sample<T>, LookupError> {
-        match record.encoding() {
-            CENTRAL_SPLINE | NON_CENTRAL_SPLINE => self.spline(record, pixel),
-            _ => quantized::sample(self, record, pixel),
-        }
-        .ok_or(LookupError::Outside)
     }
 
     /// The ray of a pixel of the region, calibrated or not, and how it moves with u and with v: of a
@@ -142,7 +123,10 @@ impl Views<'_> {
                 let [s, n] = self.patch(record, pixel)?;
                 Sample { s, n }
             }
-            _ => self.sample_other(record, pixel)?,
+            _ if is_spline(record) => {
+                spline::sample(self.pairs, record, pixel).ok_or(LookupError::Outside)?
+            }
+            _ => quantized::sample_moving(self.pairs, record, pixel).ok_or(LookupError::Outside)?,
         };
         let part = |part: fn(Dual) -> f32| Sample {
             s: sample.s.map(part),
@@ -174,31 +158,31 @@ impl Views<'_> {
         let coefficients = self.pairs.get(start..).ok_or(LookupError::Outside)?;
         let (maps, _) = coefficients.as_chunks::<10>();
         let maps = maps.first_chunk::<MAPS>().ok_or(LookupError::Outside)?;
-        Ok(maps.each_ref().map(|map| polynomial::cubic(map, x, y)))
+        // Not by `map`, which the compiler does not always inline.
+        let mut values = [[x; 2]; MAPS];
+        for (value, map) in values.iter_mut().zip(maps) {
+            *value = polynomial::cubic(map, x, y);
+        }
+        Ok(values)
     }
+}
 
-    /// The sample of a table of f32 knots. `None` cannot happen in a blob that was opened: the size of
-    /// the table was checked.
-    #[inline(never)]
-    fn spline<T: Evaluated>(self, record: Record<'_>, pixel: PixelPoint) -> Option<Sample<T>> {
-        let is_central = record.is_central();
-        let knots = |channels: usize| {
-            let first = (record.grid_offset() >> 3) as usize + channels;
-            Some(Knots::F32 {
-                pairs: self.pairs.get(first..)?,
-                stride: if is_central { 1 } else { 2 },
-            })
-        };
-        let window = Window::at(record, pixel);
-        Some(Sample {
-            s: T::blend(&window, knots(0)?)?,
-            n: if is_central {
-                [T::from(0.0); 2]
-            } else {
-                T::blend(&window, knots(1)?)?
-            },
-        })
-    }
+/// Whether a table is of the form of old versions; never, so that nothing of it is linked, where they
+/// are not read.
+#[inline(always)]
+fn is_spline(record: Record<'_>) -> bool {
+    OLDEST_VERSION < 3 && matches!(record.encoding(), CENTRAL_SPLINE | NON_CENTRAL_SPLINE)
+}
+
+/// The ray from such a table.
+#[inline(never)]
+fn lookup_spline(
+    pairs: &[[f32; 2]],
+    record: Record<'_>,
+    pixel: PixelPoint,
+) -> Result<Ray, LookupError> {
+    let sample = spline::sample(pairs, record, pixel).ok_or(LookupError::Outside)?;
+    Ok(ray(record, sample))
 }
 
 /// A ray and its derivatives by the pixel.
@@ -217,7 +201,8 @@ impl MovingRay {
 }
 
 /// The ray of a sample of a camera's table, rig frame.
-fn ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
+#[inline(always)]
+pub(crate) fn ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
     if record.is_central() {
         central_ray(record, sample.s)
     } else {
@@ -238,6 +223,15 @@ fn shifted_ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
     Ray {
         origin_mm: origin(record.rotation(), record.translation_mm(), sample),
         direction: direction(record.rotation(), sample.s),
+    }
+}
+
+/// A pixel from the outer edge of the region.
+#[inline(always)]
+pub(crate) fn from_edge(record: Record<'_>, pixel: PixelPoint) -> PixelPoint {
+    PixelPoint {
+        u: pixel.u - record.axis_u().min_px,
+        v: pixel.v - record.axis_v().min_px,
     }
 }
 

@@ -55,35 +55,64 @@ impl Mul for Dual {
     }
 }
 
-/// The polynomial of a total degree with these coefficients, and whatever stands behind them; `None`
-/// if there are too few.
-pub(crate) fn evaluate<T: Number>(
-    coefficients: &[[f32; 2]],
-    degree: u8,
-    x: T,
-    y: T,
-) -> Option<[T; 2]> {
-    if degree == 3 {
-        return Some(cubic(coefficients.first_chunk()?, x, y));
+/// The polynomial with these coefficients, as many as its total degree has: up to the ninth, written
+/// out, because the compiler unrolls one loop but not a loop of loops.
+///
+/// A pair, because that comes back in registers.
+#[inline(never)]
+pub(crate) fn evaluate(coefficients: &[[f32; 2]], x: f32, y: f32) -> (f32, f32) {
+    let Some(([a, b], rest)) = coefficients.split_first() else {
+        return (0.0, 0.0);
+    };
+    let (mut sum_a, mut sum_b) = (*a, *b);
+    // A polynomial of a lower degree is one that ends sooner.
+    macro_rules! rows {
+        ($rest:ident: $length:literal $($more:literal)*) => {
+            let Some((row, rest)) = $rest.split_first_chunk::<$length>() else {
+                return (sum_a, sum_b);
+            };
+            let (a, b) = along_x(row, x);
+            (sum_a, sum_b) = (sum_a * y + a, sum_b * y + b);
+            rows!(rest: $($more)*);
+        };
+        ($rest:ident:) => {
+            let _ = $rest;
+        };
     }
-    row_by_row(coefficients, degree, x, y)
+    rows!(rest: 2 3 4 5 6 7 8 9 10);
+    (sum_a, sum_b)
 }
 
-fn row_by_row<T: Number>(coefficients: &[[f32; 2]], degree: u8, x: T, y: T) -> Option<[T; 2]> {
-    let mut rest = coefficients;
-    let mut sum: [T; 2] = [0.0.into(); 2];
-    for others in 0..=usize::from(degree) {
-        let ([a, b], after) = rest.split_first()?;
-        let (row, after) = after.split_at_checked(others)?;
-        let (mut a, mut b) = (T::from(*a), T::from(*b));
-        for [next_a, next_b] in row {
-            a = a * x + (*next_a).into();
-            b = b * x + (*next_b).into();
-        }
-        sum = [sum[0] * y + a, sum[1] * y + b];
-        rest = after;
+/// One row.
+#[inline(always)]
+fn along_x<const LENGTH: usize>(row: &[[f32; 2]; LENGTH], x: f32) -> (f32, f32) {
+    let [mut a, mut b] = row[0];
+    for [next_a, next_b] in &row[1..] {
+        a = a * x + next_a;
+        b = b * x + next_b;
     }
-    Some(sum)
+    (a, b)
+}
+
+/// [`evaluate`] with derivatives, in a loop: for size, where that is for speed.
+#[inline(never)]
+pub(crate) fn evaluate_moving(coefficients: &[[f32; 2]], x: Dual, y: Dual) -> [Dual; 2] {
+    let mut sums = [Dual::from(0.0); 2];
+    let mut rest = coefficients;
+    let mut length = 1;
+    while let Some((row, after)) = rest.split_at_checked(length).filter(|_| !rest.is_empty()) {
+        for (k, sum) in sums.iter_mut().enumerate() {
+            let mut numbers = row
+                .iter()
+                .map(|pair| if k == 0 { pair[0] } else { pair[1] });
+            let first = Dual::from(numbers.next().unwrap_or(0.0));
+            let row = numbers.fold(first, |row, next| row * x + next.into());
+            *sum = if length == 1 { row } else { *sum * y + row };
+        }
+        rest = after;
+        length += 1;
+    }
+    sums
 }
 
 /// [`evaluate`] of a cubic, written out.
@@ -120,29 +149,33 @@ mod tests {
             for (k, (j, i)) in powers(degree).enumerate() {
                 let mut coefficients = [[0.0; 2]; coefficient_count(9)];
                 coefficients[k] = [1.0, -2.0];
-                let found = evaluate(&coefficients, degree as u8, x, y).unwrap();
+                let found = evaluate(&coefficients[..coefficient_count(degree)], x, y);
                 // Powers of 3/4 and 1/2 up to the ninth fit 24 binary digits.
                 let expected = x.powi(i as i32) * y.powi(j as i32);
-                assert_eq!(found, [expected, -2.0 * expected], "{degree} {j} {i}");
+                assert_eq!(found, (expected, -2.0 * expected), "{degree} {j} {i}");
             }
         }
-        let nine = [[1.0; 2]; 9];
-        assert!(evaluate(&nine, 2, x, y).is_some() && evaluate(&nine, 3, x, y).is_none());
     }
 
     #[test]
-    fn the_cubic_has_the_bits_of_the_general_scheme() {
-        let coefficients: [[f32; 2]; 10] =
+    fn what_is_written_out_has_the_bits_of_the_loop() {
+        let coefficients: [[f32; 2]; 55] =
             core::array::from_fn(|k| [libm::sinf(k as f32 * 1.7), libm::cosf(k as f32 * 0.9)]);
         for k in 0..100 {
             let (x, y) = (k as f32 / 99.0, (k * 37 % 100) as f32 / 99.0);
-            let written_out = cubic(&coefficients, x, y);
-            assert_eq!(
-                written_out.map(f32::to_bits),
-                row_by_row(&coefficients, 3, x, y)
-                    .unwrap()
-                    .map(f32::to_bits)
-            );
+            for degree in 0..=9 {
+                let coefficients = &coefficients[..coefficient_count(degree)];
+                let (a, b) = evaluate(coefficients, x, y);
+                let looped = evaluate_moving(coefficients, x.into(), y.into());
+                assert_eq!(
+                    looped.map(|sum| sum.value.to_bits()),
+                    [a, b].map(f32::to_bits)
+                );
+                if let Ok(ten) = coefficients.try_into() {
+                    let cubic = cubic(ten, x, y);
+                    assert_eq!(cubic.map(f32::to_bits), [a, b].map(f32::to_bits));
+                }
+            }
         }
     }
 
@@ -151,9 +184,9 @@ mod tests {
         let coefficients: [[f32; 2]; 21] =
             core::array::from_fn(|k| [libm::sinf(k as f32 * 1.7), libm::cosf(k as f32 * 0.9)]);
         let (x, y) = (0.4, -0.7);
-        let at = |x: f32, y: f32| evaluate(&coefficients, 5, x, y).unwrap();
+        let at = |x: f32, y: f32| <[f32; 2]>::from(evaluate(&coefficients, x, y));
         let dual = |value, by_u, by_v| Dual { value, by_u, by_v };
-        let found = evaluate(&coefficients, 5, dual(x, 2.0, 0.0), dual(y, 0.0, 4.0)).unwrap();
+        let found = evaluate_moving(&coefficients, dual(x, 2.0, 0.0), dual(y, 0.0, 4.0));
         let h = 0.015625;
         for (k, found) in found.into_iter().enumerate() {
             assert_eq!(found.value.to_bits(), at(x, y)[k].to_bits());

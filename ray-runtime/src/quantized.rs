@@ -1,68 +1,245 @@
 //! A table of a polynomial and of quantized spline knots, borrowed from the blob.
+//!
+//! What most tables are is written out in one function that calls no other; everything else is put
+//! together from parts.
 
 use crate::PixelPoint;
-use crate::format::{QuantizedMap, Record};
-use crate::lookup::{Evaluated, Sample, Views};
-use crate::polynomial;
-use crate::spline::{Knots, Window};
+use crate::format::{ALIGNMENT, QUANTIZED_HEADER_PAIRS, Record, coefficient_count, knots_len};
+use crate::knots::Window;
+use crate::lookup::{self, Evaluated, Sample};
+use crate::polynomial::{self, Dual};
+use crate::weights::Weights;
+use crate::{LookupError, Ray};
 
-/// The sample of a quantized table. `None` cannot happen in a blob that was opened: the sizes of its
-/// parts were checked.
+/// The ray of a pixel of the calibrated area, seen from the outer edge of the region.
+#[inline(always)]
+pub(crate) fn lookup(
+    pairs: &[[f32; 2]],
+    record: Record<'_>,
+    from_edge: PixelPoint,
+) -> Result<Ray, LookupError> {
+    // Nothing of this is missing in a blob that was opened: the sizes of its parts were checked.
+    let table = Table::of(pairs, record).ok_or(LookupError::Outside)?;
+    if table.is_usual() {
+        lookup_usual(table.pairs, record, from_edge)
+    } else {
+        lookup_any(table.pairs, record, from_edge)
+    }
+}
+
+/// The ray from a usual table, written out.
+///
+/// The arguments of this and of [`lookup_any`] fit the registers, so that they take the place of what
+/// calls them last, on the stack too.
 #[inline(never)]
-pub(crate) fn sample<T: Evaluated>(
-    views: Views<'_>,
+fn lookup_usual(
+    pairs: &[[f32; 2]],
+    record: Record<'_>,
+    from_edge: PixelPoint,
+) -> Result<Ray, LookupError> {
+    let sample = Table::starting(pairs, record).and_then(|table| table.usual_sample(from_edge));
+    Ok(lookup::ray(record, sample.ok_or(LookupError::Outside)?))
+}
+
+/// The ray from any table.
+#[inline(never)]
+fn lookup_any(
+    pairs: &[[f32; 2]],
+    record: Record<'_>,
+    from_edge: PixelPoint,
+) -> Result<Ray, LookupError> {
+    let sample = Table::starting(pairs, record).and_then(|table| table.sample(from_edge));
+    Ok(lookup::ray(record, sample.ok_or(LookupError::Outside)?))
+}
+
+/// The sample at a pixel of the region, with its derivatives by the pixel.
+#[inline(never)]
+pub(crate) fn sample_moving(
+    pairs: &[[f32; 2]],
     record: Record<'_>,
     pixel: PixelPoint,
-) -> Option<Sample<T>> {
-    let start = (record.grid_offset() >> 3) as usize;
-    let table = views.pairs.get(start..)?;
-    let [direction_a, direction_b, offset_a, offset_b, scale] = table.first_chunk()?;
-    let [scale_u, scale_v] = *scale;
-    let x = (pixel.u - record.axis_u().min_px) * scale_u - 1.0;
-    let y = (pixel.v - record.axis_v().min_px) * scale_v - 1.0;
-    let place = Place {
-        record,
-        pixel,
-        x: T::along_u(x, scale_u),
-        y: T::along_v(y, scale_v),
-    };
-    let s = place.map(table, [direction_a, direction_b])?;
+) -> Option<Sample<Dual>> {
+    let table = Table::of(pairs, record)?;
+    let from_edge = lookup::from_edge(record, pixel);
+    let s = table.value_moving(table.direction()?, from_edge)?;
     let n = if record.is_central() {
-        [T::from(0.0); 2]
+        [Dual::from(0.0); 2]
     } else {
-        place.map(table, [offset_a, offset_b])?
+        table.value_moving(table.offset()?, from_edge)?
     };
     Some(Sample { s, n })
 }
 
-/// A pixel of a camera, and the polynomials' variables there.
-struct Place<'r, T> {
-    record: Record<'r>,
-    pixel: PixelPoint,
-    x: T,
-    y: T,
+/// A table, and whatever follows it.
+#[derive(Clone, Copy)]
+struct Table<'a> {
+    record: Record<'a>,
+    pairs: &'a [[f32; 2]],
+    header: &'a [[f32; 2]; QUANTIZED_HEADER_PAIRS],
 }
 
-impl<T: Evaluated> Place<'_, T> {
-    /// The value of one of a table's maps.
-    #[inline(never)]
-    fn map(&self, table: &[[f32; 2]], [a, b]: [&[f32; 2]; 2]) -> Option<[T; 2]> {
-        let map = QuantizedMap::read([*a, *b])?;
-        let behind = |start: u32| table.get((start >> 3) as usize..);
-        let coefficients = behind(map.coefficients_start)?;
-        let predicted = polynomial::evaluate(coefficients, map.degree, self.x, self.y)?;
-        if map.number_len == 0 {
-            return Some(predicted);
-        }
-        let knots = behind(map.knots_start)?;
-        let knots = if map.number_len == 1 {
-            Knots::I8(bytemuck::cast_slice(knots))
+/// One of a table's maps.
+#[derive(Clone, Copy)]
+struct Map<'a> {
+    /// Bytes of a knot's number.
+    number_len: u8,
+    /// What a blend of knots counts.
+    unit: f32,
+    coefficients: &'a [[f32; 2]],
+    /// Pairs of the table before the knots.
+    knots_start: usize,
+}
+
+/// Coefficients of a cubic.
+const CUBIC: usize = coefficient_count(3);
+
+impl<'a> Table<'a> {
+    #[inline(always)]
+    fn of(pairs: &'a [[f32; 2]], record: Record<'a>) -> Option<Self> {
+        let start = (record.grid_offset() >> 3) as usize;
+        Self::starting(pairs.get(start..)?, record)
+    }
+
+    #[inline(always)]
+    fn starting(pairs: &'a [[f32; 2]], record: Record<'a>) -> Option<Self> {
+        Some(Self {
+            record,
+            pairs,
+            header: pairs.first_chunk()?,
+        })
+    }
+
+    /// Degree and bytes of a number of the direction, and of the offset.
+    #[inline(always)]
+    fn kinds(&self) -> [u8; 4] {
+        self.header[0][0].to_bits().to_le_bytes()
+    }
+
+    /// Pairs of the table before the knots of the direction.
+    #[inline(always)]
+    fn knots_start(&self) -> usize {
+        (self.header[0][1].to_bits() >> 3) as usize
+    }
+
+    fn direction(&self) -> Option<Map<'a>> {
+        let [degree, number_len, ..] = self.kinds();
+        Some(Map {
+            number_len,
+            unit: self.header[1][0],
+            coefficients: self.coefficients(QUANTIZED_HEADER_PAIRS, degree)?,
+            knots_start: self.knots_start(),
+        })
+    }
+
+    fn offset(&self) -> Option<Map<'a>> {
+        let [direction_degree, direction_len, degree, number_len] = self.kinds();
+        let start = QUANTIZED_HEADER_PAIRS + coefficient_count(direction_degree.into());
+        let direction_knots = knots_len(self.record.cells(), direction_len).div_ceil(ALIGNMENT);
+        Some(Map {
+            number_len,
+            unit: self.header[1][1],
+            coefficients: self.coefficients(start, degree)?,
+            knots_start: self.knots_start() + direction_knots,
+        })
+    }
+
+    fn coefficients(&self, start: usize, degree: u8) -> Option<&'a [[f32; 2]]> {
+        self.pairs
+            .get(start..)?
+            .get(..coefficient_count(degree.into()))
+    }
+
+    /// The variables of the polynomials.
+    #[inline(always)]
+    fn variables(&self, from_edge: PixelPoint) -> (f32, f32) {
+        let [scale_u, scale_v] = self.header[2];
+        (from_edge.u * scale_u - 1.0, from_edge.v * scale_v - 1.0)
+    }
+
+    /// Whether it is what most tables are: knots of i16 on a cubic and, unless the camera is central, a
+    /// cubic for the offset.
+    #[inline(always)]
+    fn is_usual(&self) -> bool {
+        let kinds = if self.record.is_central() {
+            [3, 2, 0, 0]
         } else {
-            Knots::I16(bytemuck::cast_slice(knots))
+            [3, 2, 3, 0]
         };
-        let left = T::blend(&Window::at(self.record, self.pixel), knots)?;
-        let step = T::from(map.step);
-        let [a, b] = predicted;
-        Some([a + step * left[0], b + step * left[1]])
+        self.header[0][0].to_bits() == u32::from_le_bytes(kinds)
+    }
+
+    /// The sample of such a table at a pixel.
+    #[inline(always)]
+    fn usual_sample(&self, from_edge: PixelPoint) -> Option<Sample<f32>> {
+        let (_, coefficients) = self.pairs.split_first_chunk::<QUANTIZED_HEADER_PAIRS>()?;
+        let (direction, rest) = coefficients.split_first_chunk::<CUBIC>()?;
+        let window = Window::at(self.record, self.header[3], from_edge);
+        let along = window.shares.map(Weights::at);
+        let left = window.blend_words(self.pairs, self.knots_start(), along)?;
+        let (x, y) = self.variables(from_edge);
+        let [a, b] = polynomial::cubic(direction, x, y);
+        let unit = self.header[1][0];
+        let s = [a + unit * left.0 as f32, b + unit * left.1 as f32];
+        let n = if self.record.is_central() {
+            [0.0; 2]
+        } else {
+            polynomial::cubic(rest.first_chunk()?, x, y)
+        };
+        Some(Sample { s, n })
+    }
+
+    /// The sample at a pixel.
+    #[inline(always)]
+    fn sample(&self, from_edge: PixelPoint) -> Option<Sample<f32>> {
+        let s = self.value(self.direction()?, from_edge)?;
+        let n = if self.record.is_central() {
+            [0.0; 2]
+        } else {
+            self.value(self.offset()?, from_edge)?
+        };
+        Some(Sample { s, n })
+    }
+
+    fn value(&self, map: Map<'_>, from_edge: PixelPoint) -> Option<[f32; 2]> {
+        let (x, y) = self.variables(from_edge);
+        let (a, b) = polynomial::evaluate(map.coefficients, x, y);
+        if map.number_len == 0 {
+            return Some([a, b]);
+        }
+        let window = Window::at(self.record, self.header[3], from_edge);
+        let along = window.shares.map(Weights::at);
+        let left = window.blend(self.pairs, map.knots_start, map.number_len, along)?;
+        Some([a + map.unit * left.0 as f32, b + map.unit * left.1 as f32])
+    }
+
+    fn value_moving(&self, map: Map<'_>, from_edge: PixelPoint) -> Option<[Dual; 2]> {
+        let (x, y) = self.variables(from_edge);
+        let [scale_u, scale_v] = self.header[2];
+        let (x, y) = (Dual::along_u(x, scale_u), Dual::along_v(y, scale_v));
+        let mut sums = polynomial::evaluate_moving(map.coefficients, x, y);
+        if map.number_len == 0 {
+            return Some(sums);
+        }
+        let window = Window::at(self.record, self.header[3], from_edge);
+        let [value_u, value_v] = window.shares.map(Weights::at);
+        let [slope_u, slope_v] = window.shares.map(Weights::half_slopes);
+        let per_px = [self.record.axis_u(), self.record.axis_v()].map(|axis| axis.cells_per_px);
+        let ways = [
+            ([value_u, value_v], map.unit),
+            ([slope_u, value_v], map.unit * (2.0 * per_px[0])),
+            ([value_u, slope_v], map.unit * (2.0 * per_px[1])),
+        ];
+        for (way, (along, unit)) in ways.into_iter().enumerate() {
+            let left = window.blend(self.pairs, map.knots_start, map.number_len, along)?;
+            for (sum, left) in sums.iter_mut().zip([left.0, left.1]) {
+                let part = match way {
+                    0 => &mut sum.value,
+                    1 => &mut sum.by_u,
+                    _ => &mut sum.by_v,
+                };
+                *part += unit * left as f32;
+            }
+        }
+        Some(sums)
     }
 }

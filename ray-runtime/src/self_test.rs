@@ -1,14 +1,14 @@
 //! Questions with known answers that travel in the blob, so that a device can check that it
 //! computes the same bits as the host that packed it.
 
-use crate::format::SelfTest;
+use crate::format::{Messages, SelfTest};
 use crate::{PixelPoint, RayBlob};
 
 /// Iterator over a blob's self-tests.
 #[derive(Debug, Clone)]
 pub struct SelfTests<'a> {
-    /// The postcard messages that are left.
-    pub(crate) bytes: &'a [u8],
+    /// Those that are left.
+    pub(crate) messages: Messages<'a>,
     /// How many there are left.
     pub(crate) left: u16,
 }
@@ -18,9 +18,7 @@ impl Iterator for SelfTests<'_> {
 
     fn next(&mut self) -> Option<SelfTest> {
         self.left = self.left.checked_sub(1)?;
-        let (test, rest) = postcard::take_from_bytes(self.bytes).ok()?;
-        self.bytes = rest;
-        Some(test)
+        self.messages.self_test()
     }
 }
 

@@ -1,22 +1,44 @@
-//! Bicubic B-splines of two channels over the cells of a grid.
+//! Bicubic B-splines of two channels over the cells of a grid, with f32 knots: the form of old versions.
 
 use crate::PixelPoint;
 use crate::format::Record;
 use crate::grid::{Place, blend_slopes};
+use crate::lookup::{Evaluated, Sample};
 use crate::polynomial::Dual;
+
+/// The sample of a table of f32 knots. `None` cannot happen in a blob that was opened: the size of
+/// the table was checked.
+#[inline(never)]
+pub(crate) fn sample<T: Evaluated>(
+    pairs: &[[f32; 2]],
+    record: Record<'_>,
+    pixel: PixelPoint,
+) -> Option<Sample<T>> {
+    let is_central = record.is_central();
+    let knots = |channels: usize| {
+        let first = (record.grid_offset() >> 3) as usize + channels;
+        Some(Knots {
+            pairs: pairs.get(first..)?,
+            stride: if is_central { 1 } else { 2 },
+        })
+    };
+    let window = Window::at(record, pixel);
+    Some(Sample {
+        s: T::blend(&window, knots(0)?)?,
+        n: if is_central {
+            [T::from(0.0); 2]
+        } else {
+            T::blend(&window, knots(1)?)?
+        },
+    })
+}
 
 /// The knots of two channels of a camera, borrowed from the blob.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Knots<'a> {
-    /// f32; every `stride`-th pair belongs to these channels.
-    F32 {
-        pairs: &'a [[f32; 2]],
-        stride: usize,
-    },
-    /// Steps.
-    I16(&'a [[i16; 2]]),
-    /// Steps.
-    I8(&'a [[i8; 2]]),
+pub(crate) struct Knots<'a> {
+    pairs: &'a [[f32; 2]],
+    /// Every `stride`-th pair belongs to these channels.
+    stride: usize,
 }
 
 /// Where a pixel lies on a camera's grid.
@@ -43,17 +65,11 @@ impl<'r> Window<'r> {
         }
     }
 
-    /// The spline at the pixel, in steps if the knots are: first along u in each of four rows, then
-    /// along v. `None` if there are too few knots.
+    /// The spline at the pixel: first along u in each of four rows, then along v. `None` if there
+    /// are too few knots.
     #[inline(always)]
     pub fn blend(&self, knots: Knots<'_>) -> Option<[f32; 2]> {
-        match knots {
-            Knots::I16(pairs) => self.blend_steps(pairs, self.u.of_all(), self.v.of_all()),
-            Knots::I8(pairs) => self.blend_steps(pairs, self.u.of_all(), self.v.of_all()),
-            Knots::F32 { pairs, stride } => {
-                self.blend_numbers(pairs, stride, Weights::of(self.u), Weights::of(self.v))
-            }
-        }
+        self.blend_with(knots, Weights::of(self.u), Weights::of(self.v))
     }
 
     /// [`Window::blend`], the same bits, and its derivatives by u and v.
@@ -62,39 +78,14 @@ impl<'r> Window<'r> {
         let [cells_u, cells_v] = self.record.cells();
         let slope_u = self.record.axis_u().slopes(self.pixel.u, cells_u);
         let slope_v = self.record.axis_v().slopes(self.pixel.v, cells_v);
-        let [value, by_u, by_v] = match knots {
-            Knots::I16(pairs) => self.steps_moving(pairs, slope_u, slope_v)?,
-            Knots::I8(pairs) => self.steps_moving(pairs, slope_u, slope_v)?,
-            Knots::F32 { pairs, stride } => {
-                let blend = |u, v| self.blend_numbers(pairs, stride, u, v);
-                let [along_u, along_v] = [self.u, self.v].map(Weights::of);
-                [
-                    blend(along_u, along_v)?,
-                    blend(Weights::slope(slope_u), along_v)?,
-                    blend(along_u, Weights::slope(slope_v))?,
-                ]
-            }
-        };
+        let [along_u, along_v] = [self.u, self.v].map(Weights::of);
+        let value = self.blend_with(knots, along_u, along_v)?;
+        let by_u = self.blend_with(knots, Weights::slope(slope_u), along_v)?;
+        let by_v = self.blend_with(knots, along_u, Weights::slope(slope_v))?;
         let dual = |value, by_u, by_v| Dual { value, by_u, by_v };
         Some([
             dual(value[0], by_u[0], by_v[0]),
             dual(value[1], by_u[1], by_v[1]),
-        ])
-    }
-
-    fn steps_moving<T: Copy + Into<f32>>(
-        &self,
-        pairs: &[[T; 2]],
-        slope_u: [f32; 3],
-        slope_v: [f32; 3],
-    ) -> Option<[[f32; 2]; 3]> {
-        let (along_u, along_v) = (self.u.of_all(), self.v.of_all());
-        // The slopes of all four weights cancel.
-        let of_all = |[a, c, d]: [f32; 3]| [a, -a - c - d, c, d];
-        Some([
-            self.blend_steps(pairs, along_u, along_v)?,
-            self.blend_steps(pairs, of_all(slope_u), along_v)?,
-            self.blend_steps(pairs, along_u, of_all(slope_v))?,
         ])
     }
 
@@ -103,41 +94,12 @@ impl<'r> Window<'r> {
         (self.v.cell + j) * self.knots_u + self.u.cell
     }
 
-    /// Integers are exact in f32 and what they add to is small: each counts with its own weight.
-    #[inline(never)]
-    fn blend_steps<T: Copy + Into<f32>>(
-        &self,
-        pairs: &[[T; 2]],
-        along_u: [f32; 4],
-        along_v: [f32; 4],
-    ) -> Option<[f32; 2]> {
-        let mut sum = [0.0; 2];
-        let mut rest = pairs.get(self.start(0)..)?;
-        for (j, weight) in along_v.into_iter().enumerate() {
-            if j > 0 {
-                rest = rest.get(self.knots_u..)?;
-            }
-            let [a, b, c, d] = rest.first_chunk::<4>()?;
-            for (channel, sum) in sum.iter_mut().enumerate() {
-                let at =
-                    |pair: &[T; 2]| -> f32 { if channel == 0 { pair[0] } else { pair[1] }.into() };
-                let row = along_u[0] * at(a)
-                    + along_u[1] * at(b)
-                    + along_u[2] * at(c)
-                    + along_u[3] * at(d);
-                *sum += weight * row;
-            }
-        }
-        Some(sum)
-    }
-
     /// Numbers of full size are blended as one of them and differences to it, whose round-off is
     /// smaller.
     #[inline(never)]
-    fn blend_numbers(
+    fn blend_with(
         &self,
-        pairs: &[[f32; 2]],
-        stride: usize,
+        Knots { pairs, stride }: Knots<'_>,
         along_u: Weights,
         along_v: Weights,
     ) -> Option<[f32; 2]> {

@@ -39,8 +39,10 @@ fn every_pixel_has_its_direction(form: Form) {
             let [s1, s2] = camera.s(u, v);
             let expected = Vector3::new(s1, s2, 1.0 - (s1 * s1 + s2 * s2) / 4.0);
             let ray = blob.lookup(0, PixelPoint::new(u, v)).unwrap();
-            // |s| is below 0.8: four roundings of 6e-8.
-            assert!((ray.direction - expected).norm() < 2.5e-7, "{u} {v}");
+            assert!(
+                (ray.direction - expected).norm() < camera.round_off(),
+                "{u} {v}"
+            );
             assert_eq!(ray.origin_mm, Vector3::zeros());
         }
     }

@@ -2,7 +2,7 @@
 self-tests of variant 2 give the stated bits. Usage: read_uncertainty.py RIG.rays; exit code 1 if a bit differs."""
 import io, math, struct, sys
 import read_blob
-from read_blob import F, cross, dot, integer, numbers, ray, table
+from read_blob import F, blend, cross, dot, integer, numbers, ray, table, weights
 
 class D(F):
     """An f32 with its derivatives by u and by v, found beside it."""
@@ -21,31 +21,37 @@ class D(F):
         return D.__add__(a, -F(b)) if not isinstance(b, D) else D(F(a) - F(b), (x - y for x, y in zip(a.slopes, b.slopes)))
     __radd__, __rmul__ = __add__, __mul__
 
-def spline(axes, cells, x, knot, small):
+def spline(axes, cells, x, knot):
     """The spline, and its blends with the other weights."""
-    def weights(k):
+    def along(k):
         t = ((F(x[k]) - cells[k] * axes[k][3]) - cells[k] * axes[k][4]) * axes[k][2]
         r, density = 1 - t, axes[k][2]
         places = ((r * r) * r) * F(1 / 6), F(2 / 3) - (r * r) * (1 - 0.5 * r), ((t * t) * t) * F(1 / 6)
         return places, ((-0.5 * (r * r)) * density, (r * (2 - 1.5 * r)) * density, (0.5 * (t * t)) * density)
     def change(w, a, b, c, d):
-        if small:
-            return ((w[0] * a + ((-w[0] - w[1]) - w[2]) * b) + w[1] * c) + w[2] * d
         return (w[0] * (a - b) + w[1] * (c - b)) + w[2] * (d - b)
-    def blend(w, a, b, c, d):
-        if small:
-            return ((w[0] * a + (((1 - w[0]) - w[1]) - w[2]) * b) + w[1] * c) + w[2] * d
+    def mean(w, a, b, c, d):
         return b + change(w, a, b, c, d)
-    (wu, eu), (wv, ev) = weights(0), weights(1)
-    window = [[knot(cells[0] + i, cells[1] + j) for i in range(4)] for j in range(4)]
-    rows = [blend(wu, *row) for row in window]
-    return D(blend(wv, *rows), (blend(wv, *(change(eu, *row) for row in window)), change(ev, *rows)))
-read_blob.spline = spline
+    (wu, eu), (wv, ev) = along(0), along(1)
+    window = [[F(knot(cells[0] + i, cells[1] + j)) for i in range(4)] for j in range(4)]
+    rows = [mean(wu, *row) for row in window]
+    return D(mean(wv, *rows), (mean(wv, *(change(eu, *row) for row in window)), change(ev, *rows)))
+
+def slopes(t):
+    """The other weights of quantized knots, at a place in its cell."""
+    r = 16384 - t
+    e0, e3 = 3 * (r * r >> 16), -3 * (t * t >> 16)
+    return e0, 24576 - 2 * e0 + e3, -24576 + e0 - 2 * e3, e3
+
+def small(unit, axes, places, knot):
+    by_u, by_v = blend(places, knot, slopes, weights), blend(places, knot, weights, slopes)
+    return D(unit * blend(places, knot), ((unit * (2 * axes[0][2])) * by_u, (unit * (2 * axes[1][2])) * by_v))
+read_blob.spline, read_blob.small = spline, small
 
 def shifts(blob, record, pixel, at):
     """How the ray moves at lambda with u and with v, mm/px."""
     found = table(blob, record, [D(pixel[0], (1, 0)), D(pixel[1], (0, 1))])
-    (s1, s2, n1, n2), r = [*map(D.of, found), D(0), D(0)][:4], numbers("f", blob, record + 80, 9)
+    (s1, s2, n1, n2), r = [*map(D.of, found), D(0), D(0)][:4], numbers(blob, record + 80, 9)
     values = [F(a) for a in (s1, s2, n1, n2)]
     moved = []
     for k in (0, 1):
@@ -69,17 +75,17 @@ def pair_of(blob, at, cameras):
 
 def factor(blob, at, pixel):
     """The ten numbers of L, px."""
-    nodes, number = struct.unpack_from("<2H", blob, at + 4), numbers("f", blob, at + 8, 6)
+    nodes, number = struct.unpack_from("<2H", blob, at + 4), numbers(blob, at + 8, 6)
     q = [(pixel[k] - number[k]) * number[2 + k] for k in (0, 1)]
     i = [max(0, min(math.floor(q[k]), nodes[k] - 2)) for k in (0, 1)]
     c = [F(max(0, min(q[k] - i[k], 1))) for k in (0, 1)]
     def node(u, v):
         scale, *triangle = struct.unpack_from("<B10b", blob, at + 32 + 11 * (v * nodes[0] + u))
         return [F(scale * a) for a in triangle]
-    def blend(c, near, far):
+    def between(c, near, far):
         return [a + c * (b - a) for a, b in zip(near, far)]
-    rows = [blend(c[0], node(i[0], i[1] + j), node(i[0] + 1, i[1] + j)) for j in (0, 1)]
-    return [a * number[4] for a in blend(c[1], *rows)], number[5]
+    rows = [between(c[0], node(i[0], i[1] + j), node(i[0] + 1, i[1] + j)) for j in (0, 1)]
+    return [a * number[4] for a in between(c[1], *rows)], number[5]
 
 def sigma(blob, pairs, records, cameras, pixels):
     rays = [ray(blob, record, pixel) for record, pixel in zip(records, pixels)]
@@ -119,7 +125,7 @@ def main(blob):
     for _ in range(test_count):
         kind = integer(meta)
         cameras = tuple(integer(meta) for _ in range(min(kind, 1) + 1))
-        pixels = [numbers("f", meta.read(8), 0, 2) for _ in cameras]
+        pixels = [numbers(meta.read(8), 0, 2) for _ in cameras]
         stated = meta.read((24, 16, 12)[kind])
         if kind == 2:
             found = sigma(blob, pairs, [first_record + 128 * camera for camera in cameras], cameras, pixels)

@@ -6,7 +6,9 @@ use super::residual_spline::{Knots, ResidualSpline};
 use super::table::{Table, Target};
 use crate::field::CalibratedCamera;
 use crate::geometry::PixelPoint;
-use ray_runtime::format::{Encoding, Form, MAX_DEGREE, QuantizedHeader, QuantizedMap};
+use ray_runtime::format::{
+    Encoding, Form, MAX_DEGREE, QuantizedHeader, QuantizedMap, UNITS_PER_STEP,
+};
 
 /// Bytes of a knot's number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -119,7 +121,8 @@ impl<'a> Predictors<'a> {
 
     /// Bytes of the table with a direction polynomial of this degree and these knots.
     pub fn byte_count(&self, degree: u8, number: Number, cells: [u32; 2]) -> usize {
-        self.header(degree, number, [0.0; 2], cells).1
+        let header = self.header(degree, number, [0.0; 2], cells);
+        header.layout(cells).offset_knots_end
     }
 
     fn header(
@@ -128,12 +131,17 @@ impl<'a> Predictors<'a> {
         number: Number,
         [step, offset_step]: [f64; 2],
         cells: [u32; 2],
-    ) -> (QuantizedHeader, usize) {
+    ) -> QuantizedHeader {
         let sensor = self.camera.field.sensor;
-        let direction = QuantizedMap::new(degree, number.len(), step as f32);
+        let map = |degree, number: Number, step: f64| QuantizedMap {
+            degree,
+            number_len: number.len(),
+            unit: (step / f64::from(UNITS_PER_STEP)) as f32,
+        };
+        let direction = map(degree, number, step);
         let offset = self.offset.as_ref().map(|offset| {
             let number = self.offset_number(number);
-            QuantizedMap::new(offset.degree as u8, number.len(), offset_step as f32)
+            map(offset.degree as u8, number, offset_step)
         });
         QuantizedHeader::new(direction, offset, [sensor.width, sensor.height], cells)
     }
@@ -184,23 +192,18 @@ impl<'a> Predictors<'a> {
             _ => 0.0,
         };
         let steps = [step([0, 1], number), step([2, 3], offset_number)];
-        let (header, len) = self.header(degree, number, steps, cells);
+        let header = self.header(degree, number, steps, cells);
+        let layout = header.layout(cells);
 
         let mut bytes = header.to_bytes().to_vec();
-        for (coefficients, channels, map) in [
-            (&direction, [0, 1], header.direction),
-            (&offset, [2, 3], header.offset),
-        ] {
-            if coefficients.is_empty() {
-                continue;
-            }
-            bytes.resize(map.coefficients_start as usize, 0);
-            push_coefficients(&mut bytes, coefficients, channels);
-            if let Some(knots) = knots.as_ref().filter(|_| map.number_len > 0) {
-                push_knots(&mut bytes, knots, channels, map);
-            }
+        push_coefficients(&mut bytes, &direction, [0, 1]);
+        push_coefficients(&mut bytes, &offset, [2, 3]);
+        if let Some(knots) = &knots {
+            push_knots(&mut bytes, knots, [0, 1], header.direction);
+            bytes.resize(layout.offset_knots, 0);
+            push_knots(&mut bytes, knots, [2, 3], header.offset);
         }
-        debug_assert_eq!(bytes.len(), len);
+        debug_assert_eq!(bytes.len(), layout.offset_knots_end);
         Ok(Table {
             encoding: Encoding {
                 form: Form::Quantized,
@@ -247,7 +250,10 @@ fn push_coefficients(bytes: &mut Vec<u8>, coefficients: &[[f64; 4]], channels: [
 }
 
 fn push_knots(bytes: &mut Vec<u8>, knots: &Knots, channels: [usize; 2], map: QuantizedMap) {
-    let step = f64::from(map.step);
+    if map.number_len == 0 {
+        return;
+    }
+    let step = f64::from(map.unit) * f64::from(UNITS_PER_STEP);
     for knot in &knots.knots {
         for c in channels {
             // A step of zero is that of knots of zero; casts saturate, and what is no number is 0.

@@ -8,6 +8,7 @@ use crate::field::knot_order::KnotOrder;
 use crate::field::spline::SplineGrid;
 use crate::geometry::PixelPoint;
 use crate::geometry::banded::BandedSystem;
+use ray_runtime::format::{PLACES_PER_CELL, places_per_px};
 
 /// Knots of a uniform bicubic B-spline whose cells cover the sensor from outer edge to outer edge.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,10 +82,11 @@ impl<'a> ResidualSpline<'a> {
 
         let mut is_used = vec![false; grid.knot_count()];
         let rows = FieldRows::new(&self.camera.field, lattice.u_px.clone());
-        let weights_u: Vec<_> = lattice.u_px.iter().map(|u| grid.weights_u(*u)).collect();
+        let on_u = |u: &f64| grid.weights_u(on_grid(*u, grid.sensor.width, grid.cells_u));
+        let weights_u: Vec<_> = lattice.u_px.iter().map(on_u).collect();
         for (row_idx, &v) in lattice.v_px.iter().enumerate() {
             let row = rows.row(v);
-            let weights_v = grid.weights_v(v);
+            let weights_v = grid.weights_v(on_grid(v, grid.sensor.height, grid.cells_v));
             for (column, weights_u) in weights_u.iter().enumerate() {
                 let weight = lattice.weights[row_idx * lattice.u_px.len() + column];
                 if weight == 0.0 {
@@ -120,6 +122,14 @@ impl<'a> ResidualSpline<'a> {
             .unzip();
         Ok(Knots { knots, is_used })
     }
+}
+
+/// The coordinate at which a grid without round-off is what the runtime's is at `px`: that ends a little
+/// before the sensor does, and rounds places down, by half of one on average.
+fn on_grid(px: f64, extent_px: u32, cells: usize) -> f64 {
+    let place = (px + 0.5) * f64::from(places_per_px(cells as u32, extent_px)) - 0.5;
+    let px_per_place = f64::from(extent_px) / (cells as f64 * f64::from(PLACES_PER_CELL));
+    place * px_per_place - 0.5
 }
 
 /// Where the field is sampled, and what each sample counts.

@@ -19,6 +19,7 @@ const BUILT_IN: &[&str] = &[
     "data/golden/non-central-v3-fast.rays",
     "data/golden/central-v3-small.rays",
     "data/golden/non-central-v3-small.rays",
+    "data/golden/non-central-v3-cubic.rays",
     "data/golden/stereo-v2.rays",
 ];
 

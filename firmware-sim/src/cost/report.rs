@@ -21,6 +21,8 @@ pub struct Cost {
     pub blobs: Vec<BlobCost>,
     /// Per image: code, memory, bound of the stack.
     pub images: Vec<ImageCost>,
+    /// Code of the runtime in the first of them without the feature `old-versions`.
+    pub newest_only_code_bytes: u64,
 }
 
 /// What it was measured with.

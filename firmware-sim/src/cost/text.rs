@@ -122,6 +122,12 @@ impl Cost {
         }
         heading(text, style, "Code and memory of the images, bytes");
         let _ = writeln!(text, "{}", sizes(&self.images).drawn(style));
+        let _ = writeln!(
+            text,
+            "Without the feature `old-versions` of `ray-runtime`, which reads blobs of versions 1 and 2, the code of the \
+             first is {} bytes.\n",
+            self.newest_only_code_bytes
+        );
         heading(text, style, "Code by the crate it comes from, bytes");
         let _ = writeln!(text, "{}", origins(&self.images).drawn(style));
         heading(

@@ -1,5 +1,7 @@
 //! The forms in which a camera's field can be stored.
 
+use super::OLDEST_VERSION;
+
 /// How a camera's table is stored. Every form gives, for a pixel, the half-angle vector of its ray
 /// and, if the camera is not central, the scaled offset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,6 +48,11 @@ impl Encoding {
             Form::Quantized => 5,
         };
         if self.is_central { first } else { first + 1 }
+    }
+
+    /// Whether this library reads it: the form of old versions needs the feature `old-versions`.
+    pub const fn is_read(self) -> bool {
+        OLDEST_VERSION < 3 || !matches!(self.form, Form::Spline)
     }
 
     /// The lowest format version that has it.

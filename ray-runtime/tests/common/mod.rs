@@ -4,8 +4,9 @@
 #![allow(dead_code)]
 
 use ray_runtime::format::{
-    self, Axis, CameraMeta, Encoding, Form, HEADER_LEN, Header, LengthUnit, Meta, PairHeader,
-    PixelConvention, QuantizedHeader, QuantizedMap, RECORD_LEN, RecordFields, SelfTest, VERSION,
+    self, Axis, CameraMeta, Encoding, Form, HEADER_LEN, Header, LengthUnit, Meta, PLACES_PER_CELL,
+    PairHeader, PixelConvention, QuantizedHeader, QuantizedMap, RECORD_LEN, RecordFields, SelfTest,
+    UNITS_PER_STEP, VERSION,
 };
 
 /// Bytes that start on a multiple of 8.
@@ -65,6 +66,9 @@ pub struct TestCamera {
 }
 
 pub const IDENTITY: [f32; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+
+/// What quantized knots hold of the slope along v.
+const KNOTS_SHARE: f64 = 1.0 / 16.0;
 
 impl TestCamera {
     pub fn new(name: &'static str, x_mm: f32) -> Self {
@@ -158,33 +162,73 @@ impl TestCamera {
                     }
                 }
             }
-            // The polynomial has the slope along u and the middle; the knots that along v.
-            Form::Quantized => {
-                let is_central = self.encoding.is_central;
-                let direction = QuantizedMap::new(1, 2, 1.0 / 512.0 / self.focal_px);
-                let offset = (!is_central).then_some(QuantizedMap::new(0, 1, 0.25));
-                let extent = [self.region[2], self.region[3]];
-                let (header, len) = QuantizedHeader::new(direction, offset, extent, self.cells);
-                bytes.extend(header.to_bytes());
-                let middle = [0, 1].map(|axis| self.edge(axis, self.cells[axis] as f32 / 2.0));
-                let [s1, s2] = self.s(middle[0], middle[1]);
-                let slope_u = extent[0] as f32 / 2.0 / self.focal_px;
-                bytes.extend(f32_bytes(vec![0.0, 0.0, slope_u, 0.0, s1, s2]));
-                for j in 0..cells_v + 3 {
-                    let v = self.edge(1, j as f32 - 1.0) - middle[1];
-                    let knot = [0, (512.0 * v).round() as i16];
-                    let row = knot.map(i16::to_le_bytes).concat();
-                    bytes.extend(row.repeat(cells_u as usize + 3));
-                }
-                if !is_central {
-                    bytes.resize(header.offset.coefficients_start as usize, 0);
-                    bytes.extend(f32_bytes(vec![self.offset_mm[0], self.offset_mm[1] - 1.0]));
-                    bytes.extend([0, 4].repeat(((cells_u + 3) * (cells_v + 3)) as usize));
-                }
-                bytes.resize(len, 0);
-            }
+            Form::Quantized => bytes = self.quantized_table(),
         }
         bytes
+    }
+
+    /// Knots of a 16th of the slope along v, in whole steps; the polynomial has the rest of it, and all
+    /// of that along u.
+    fn quantized_table(&self) -> Vec<u8> {
+        const STEPS_PER_ROW: i16 = 1024;
+        let f32_bytes = |numbers: Vec<f32>| numbers.into_iter().flat_map(f32::to_le_bytes);
+        let [first_u, first_v, width, height] = self.region;
+        let [cells_u, cells_v] = self.cells;
+        let is_central = self.encoding.is_central;
+        let map = |degree, number_len, step: f64| QuantizedMap {
+            degree,
+            number_len,
+            unit: (step / f64::from(UNITS_PER_STEP)) as f32,
+        };
+        let focal_px = f64::from(self.focal_px);
+        // Of a cell, in units of the half-angle vector.
+        let by_knots = KNOTS_SHARE * f64::from(height) / f64::from(cells_v) / focal_px;
+        let direction = map(1, 2, by_knots / f64::from(STEPS_PER_ROW));
+        let offset = (!is_central).then_some(map(0, 1, 0.25));
+        let header = QuantizedHeader::new(direction, offset, [width, height], self.cells);
+        let layout = header.layout(self.cells);
+
+        // Places are rounded down, by half of one on average.
+        let by_place = by_knots / f64::from(PLACES_PER_CELL);
+        let by_px = by_place * f64::from(header.places_per_px[1]);
+        let slope_u = f64::from(width) / 2.0 / focal_px;
+        let slope_v = f64::from(height) / 2.0 * (1.0 / focal_px - by_px);
+        let [s1, s2] = self
+            .s(first_u as f32 - 0.5, first_v as f32 - 0.5)
+            .map(f64::from);
+        let zero = [s1 + slope_u, s2 + slope_v + 0.5 * by_place];
+        let mut bytes = header.to_bytes().to_vec();
+        let linear = [0.0, slope_v, slope_u, 0.0, zero[0], zero[1]];
+        bytes.extend(f32_bytes(linear.map(|x| x as f32).to_vec()));
+        if !is_central {
+            bytes.extend(f32_bytes(vec![self.offset_mm[0], self.offset_mm[1] - 1.0]));
+        }
+        for j in 0..cells_v as i16 + 3 {
+            let knot = [0, STEPS_PER_ROW * (j - 1)];
+            let row = knot.map(i16::to_le_bytes).concat();
+            bytes.extend(row.repeat(cells_u as usize + 3));
+        }
+        if !is_central {
+            bytes.resize(layout.offset_knots, 0);
+            bytes.extend([0, 4].repeat(((cells_u + 3) * (cells_v + 3)) as usize));
+        }
+        bytes
+    }
+
+    /// By how much a lookup may miss the half-angle vector.
+    pub fn round_off(&self) -> f32 {
+        // |s| is below 0.8: four roundings of 6e-8.
+        let of_numbers = 2.5e-7;
+        match self.encoding.form {
+            Form::Spline | Form::Patches => of_numbers,
+            // The slope of the knots, by half a place. (Their rows are weighed without the last binary
+            // digits: 4 of 36864 units to a step, of which the knots here have 1024 to a row.)
+            Form::Quantized => {
+                let cell_px = self.region[3] as f32 / self.cells[1] as f32;
+                let half_place_px = 0.5 * cell_px / PLACES_PER_CELL as f32;
+                of_numbers + KNOTS_SHARE as f32 * half_place_px / self.focal_px
+            }
+        }
     }
 
     fn mask_bytes(&self) -> Vec<u8> {
