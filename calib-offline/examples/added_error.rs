@@ -1,0 +1,57 @@
+//! What packing adds to the error of points: the same matches measured with a calibration and with a blob
+//! made of it, the RMS of their difference over the RMS of the predicted standard deviation.
+//!
+//! ```sh
+//! cargo run --release -p calib-offline --example added_error -- out/calibration.json rig.rays set/holdout.csv
+//! ```
+
+use anyhow::{Context, bail};
+use calib_offline::matches::read_matches;
+use calib_offline::matches::source::{BlobSource, PointSource, RigSource};
+use calib_offline::pack::AlignedBytes;
+use calib_offline::report::Calibration;
+use ray_runtime::RayBlob;
+use std::path::PathBuf;
+
+fn main() -> anyhow::Result<()> {
+    let arguments: Vec<PathBuf> = std::env::args_os().skip(1).map(PathBuf::from).collect();
+    let [calibration, blob, matches] = &arguments[..] else {
+        bail!("give calibration.json, a blob of it, and matches: see the head of this example");
+    };
+    let read = |path: &PathBuf| std::fs::read(path).with_context(|| path.display().to_string());
+    let bytes = AlignedBytes::from(read(blob)?.as_slice());
+    let blob = RayBlob::open(&bytes).context("the blob")?;
+    let packed = BlobSource::new(&blob, None).context("the blob's own frame")?;
+    let calibration = Calibration::load(calibration)?;
+    let exact = RigSource::new(&calibration.rig, None).context("the rig's own frame")?;
+
+    let (mut difference_squared, mut sigma_squared, mut count) = (0.0, 0.0, 0_usize);
+    for sightings in read_matches::<f64>(matches, &exact.cameras())? {
+        let as_f32: Vec<_> = sightings
+            .iter()
+            .map(|(camera, pixel)| (*camera, pixel.map(|px| px as f32)))
+            .collect();
+        let (Ok(there), Ok(here)) = (packed.point(&as_f32), exact.point(&sightings)) else {
+            continue;
+        };
+        let Some(sigma_mm) = here.sigma_mm else {
+            continue;
+        };
+        count += 1;
+        for k in 0..3 {
+            difference_squared += (f64::from(there.point_mm[k]) - here.point_mm[k]).powi(2);
+            sigma_squared += sigma_mm[k].powi(2);
+        }
+    }
+    if count == 0 {
+        bail!("no match has a point with a predicted standard deviation in both");
+    }
+    let rms = |sum: f64| (sum / count as f64).sqrt();
+    println!(
+        "{count} points: {:.6} mm added, {:.6} mm predicted (RMS), {:.3} %",
+        rms(difference_squared),
+        rms(sigma_squared),
+        100.0 * (difference_squared / sigma_squared).sqrt()
+    );
+    Ok(())
+}
