@@ -38,10 +38,11 @@ fn main() -> anyhow::Result<()> {
             continue;
         };
         count += 1;
-        for k in 0..3 {
-            difference_squared += (f64::from(there.point_mm[k]) - here.point_mm[k]).powi(2);
-            sigma_squared += sigma_mm[k].powi(2);
-        }
+        let differences = there.point_mm.iter().zip(here.point_mm);
+        difference_squared += differences
+            .map(|(there, here)| (f64::from(*there) - here).powi(2))
+            .sum::<f64>();
+        sigma_squared += sigma_mm.iter().map(|sigma| sigma.powi(2)).sum::<f64>();
     }
     if count == 0 {
         bail!("no match has a point with a predicted standard deviation in both");

@@ -8,9 +8,9 @@ use ray_runtime::{OpenError, RayBlob};
 use super::{ClientError, DeviceClient, unexpected};
 use crate::frame::checksum;
 use crate::protocol::{
-    CHUNK_UNIT, Chunk, IDENTITY_LENGTH, MAX_CHUNK, NewBlob, Refusal, Reply, Request, Signature,
-    StoredBlob, name,
+    CHUNK_UNIT, Chunk, MAX_CHUNK, NewBlob, Refusal, Reply, Request, Signature, StoredBlob, name,
 };
+use crate::storage::rig;
 
 /// How patiently a blob is sent.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -80,7 +80,7 @@ impl DeviceClient {
         let new = NewBlob {
             length: u32::try_from(blob.len()).unwrap_or(u32::MAX),
             checksum: checksum(blob),
-            identity: identity_of(blob).map_err(ClientError::NotABlob)?,
+            identity: ask_blob(blob, |blob| *blob.identity()).map_err(ClientError::NotABlob)?,
             rig_serial: options.rig_serial.as_deref().map(name),
             signature: options.signature,
         };
@@ -150,6 +150,13 @@ impl DeviceClient {
         progress: &mut FlashProgress,
         on_progress: &mut dyn FnMut(FlashProgress),
     ) -> Result<Flashed, ClientError> {
+        // The device compares the cameras itself, but only once it has given up the blob before for it.
+        if let Some(own) = &self.status()?.rig {
+            let compared = ask_blob(blob, |blob| rig::compare(blob, own));
+            compared
+                .map_err(ClientError::NotABlob)?
+                .map_err(ClientError::Refused)?;
+        }
         let mut stored = match self.begin_update(new)? {
             Begun::Active(stored) => {
                 return Ok(Flashed {
@@ -266,11 +273,11 @@ fn received(reply: &Reply) -> Result<u32, ClientError> {
     }
 }
 
-/// The identity of a blob, which must be one, whole and readable.
-fn identity_of(blob: &[u8]) -> Result<[u8; IDENTITY_LENGTH], OpenError> {
+/// Asks a blob, which must be one, whole and readable.
+fn ask_blob<T>(blob: &[u8], ask: impl FnOnce(&RayBlob<'_>) -> T) -> Result<T, OpenError> {
     let mut words = vec![0_u64; blob.len().div_ceil(8)];
     let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
     let (bytes, _) = bytes.split_at_mut(blob.len());
     bytes.copy_from_slice(blob);
-    RayBlob::open(bytes).map(|blob| *blob.identity())
+    RayBlob::open(bytes).map(|blob| ask(&blob))
 }
