@@ -38,7 +38,7 @@ worst_direction; schema calib-offline/device-rollback/1 with slot, sequence, byt
 #[derive(Debug, Args)]
 #[command(before_help = EXAMPLE, after_help = FORMATS)]
 pub struct DeviceArgs {
-    /// The device: tcp:HOST:PORT or serial:PORT[@BAUD]
+    /// The device: tcp:HOST:PORT or serial:PORT@BAUD
     #[arg(long, value_name = "ADDRESS", global = true)]
     pub device: Option<String>,
     /// How long an answer may take, s

@@ -41,7 +41,7 @@ pub struct FlashArgs {
     /// The blob
     #[arg(value_name = "RIG.rays")]
     pub rig: PathBuf,
-    /// The device: tcp:HOST:PORT or serial:PORT[@BAUD]
+    /// The device: tcp:HOST:PORT or serial:PORT@BAUD
     #[arg(long, value_name = "ADDRESS")]
     pub device: String,
     /// The serial number of the rig that was calibrated

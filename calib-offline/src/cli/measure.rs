@@ -63,7 +63,7 @@ pub struct MeasureArgs {
     /// Give the points in the frame of this camera instead of the rig's
     #[arg(long, value_name = "CAMERA", conflicts_with = "device")]
     pub frame: Option<String>,
-    /// Let this device measure, instead of a RIG: tcp:HOST:PORT or serial:PORT[@BAUD]
+    /// Let this device measure, instead of a RIG: tcp:HOST:PORT or serial:PORT@BAUD
     #[arg(long, value_name = "ADDRESS")]
     pub device: Option<String>,
     /// Replace whatever stands in the output's place
