@@ -138,7 +138,7 @@ int rays_lookup(const rays_rig *rig, rays_sighting sighting, rays_ray *ray);
 
 int rays_triangulate(const rays_rig *rig, rays_sighting first, rays_sighting second, rays_point *point);
 
-/* About three and a half times the work of rays_triangulate, whose bits the point has. */
+/* About four times the work of rays_triangulate, whose bits the point has. */
 int rays_triangulate_with_covariance(const rays_rig *rig, rays_sighting first, rays_sighting second,
                                      rays_measurement *measurement);
 

@@ -208,7 +208,7 @@ impl<'a> RayBlob<'a> {
     /// [`RayBlob::triangulate`] with the covariance of the point, rig frame. The cameras may come in
     /// either order.
     ///
-    /// The point's bits are those of `triangulate`. It costs about three and a half of them, as the
+    /// The point's bits are those of `triangulate`. It costs about four of them, as the
     /// rays are looked up with their derivatives. Whoever does not call it has none of it linked but
     /// what checks the blob.
     ///
