@@ -9,12 +9,16 @@
 
 #![no_std]
 
-use core::ffi::{c_char, c_int};
+mod types;
+
+use core::ffi::c_int;
 use core::mem::MaybeUninit;
 use nalgebra::Vector3;
 use ray_runtime::{
     MeasureError, OpenError, PixelPoint, ProjectError, RayBlob, Readout, SensorWindow,
 };
+
+pub use types::{Camera, CameraReadout, CurvePoint, Measurement, Pixel, Point, Ray, Sighting};
 
 /// Done.
 pub const OK: c_int = 0;
@@ -45,72 +49,6 @@ const _: () = assert!(
     size_of::<Opened>() <= size_of::<Rig>() && align_of::<Opened>() <= align_of::<Rig>(),
     "an opened blob does not fit into a rays_rig: enlarge it here and in rays.h"
 );
-
-/// A pixel of a camera.
-#[repr(C)]
-#[derive(Clone, Copy)]
-pub struct Sighting {
-    camera: usize,
-    u_px: f32,
-    v_px: f32,
-}
-
-/// A place on a sensor or an image.
-#[repr(C)]
-#[derive(Clone, Copy)]
-pub struct Pixel {
-    u_px: f32,
-    v_px: f32,
-}
-
-/// A camera of the blob.
-#[repr(C)]
-pub struct Camera {
-    name: *const c_char,
-    name_len: usize,
-    sensor_width_px: u32,
-    sensor_height_px: u32,
-}
-
-/// A point on the ray of a pixel, and where another camera sees it.
-#[repr(C)]
-pub struct CurvePoint {
-    pixel: Pixel,
-    point_mm: [f32; 3],
-}
-
-/// What a camera reads out.
-#[repr(C)]
-#[derive(Clone, Copy)]
-pub struct CameraReadout {
-    sensor_px: [u32; 2],
-    first_px: [u32; 2],
-    image_px: [u32; 2],
-    binning: [u32; 2],
-}
-
-/// A ray, rig frame.
-#[repr(C)]
-pub struct Ray {
-    origin_mm: [f32; 3],
-    direction: [f32; 3],
-}
-
-/// A triangulated point, rig frame.
-#[repr(C)]
-pub struct Point {
-    point_mm: [f32; 3],
-    gap_squared_mm2: f32,
-}
-
-/// A triangulated point with its standard deviations, rig frame.
-#[repr(C)]
-pub struct Measurement {
-    point_mm: [f32; 3],
-    gap_squared_mm2: f32,
-    sigma_mm: [f32; 3],
-    has_sigma: c_int,
-}
 
 /// How long the blob at the start of `bytes` says it is.
 ///
@@ -419,31 +357,6 @@ pub unsafe extern "C" fn rays_self_test(rig: *const Rig, number: *mut usize) -> 
 fn no_camera(blob: &RayBlob<'_>, camera: usize) -> u8 {
     let count = blob.camera_count();
     ProjectError::NoSuchCamera { camera, count }.code()
-}
-
-impl From<PixelPoint> for Pixel {
-    fn from(pixel: PixelPoint) -> Self {
-        Self {
-            u_px: pixel.u,
-            v_px: pixel.v,
-        }
-    }
-}
-
-impl From<Pixel> for PixelPoint {
-    fn from(pixel: Pixel) -> Self {
-        Self::new(pixel.u_px, pixel.v_px)
-    }
-}
-
-impl Sighting {
-    const fn pixel(self) -> PixelPoint {
-        PixelPoint::new(self.u_px, self.v_px)
-    }
-
-    const fn of_rust(self) -> (usize, PixelPoint) {
-        (self.camera, self.pixel())
-    }
 }
 
 /// The bytes, unless the pointer is null or no object has that many.

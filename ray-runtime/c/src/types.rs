@@ -1,0 +1,95 @@
+//! What crosses the interface by value: the structs of `rays.h`, field by field.
+
+use core::ffi::{c_char, c_int};
+use ray_runtime::PixelPoint;
+
+/// A pixel of a camera.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct Sighting {
+    pub(crate) camera: usize,
+    pub(crate) u_px: f32,
+    pub(crate) v_px: f32,
+}
+
+/// A place on a sensor or an image.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct Pixel {
+    pub(crate) u_px: f32,
+    pub(crate) v_px: f32,
+}
+
+/// A camera of the blob.
+#[repr(C)]
+pub struct Camera {
+    pub(crate) name: *const c_char,
+    pub(crate) name_len: usize,
+    pub(crate) sensor_width_px: u32,
+    pub(crate) sensor_height_px: u32,
+}
+
+/// A point on the ray of a pixel, and where another camera sees it.
+#[repr(C)]
+pub struct CurvePoint {
+    pub(crate) pixel: Pixel,
+    pub(crate) point_mm: [f32; 3],
+}
+
+/// What a camera reads out.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct CameraReadout {
+    pub(crate) sensor_px: [u32; 2],
+    pub(crate) first_px: [u32; 2],
+    pub(crate) image_px: [u32; 2],
+    pub(crate) binning: [u32; 2],
+}
+
+/// A ray, rig frame.
+#[repr(C)]
+pub struct Ray {
+    pub(crate) origin_mm: [f32; 3],
+    pub(crate) direction: [f32; 3],
+}
+
+/// A triangulated point, rig frame.
+#[repr(C)]
+pub struct Point {
+    pub(crate) point_mm: [f32; 3],
+    pub(crate) gap_squared_mm2: f32,
+}
+
+/// A triangulated point with its standard deviations, rig frame.
+#[repr(C)]
+pub struct Measurement {
+    pub(crate) point_mm: [f32; 3],
+    pub(crate) gap_squared_mm2: f32,
+    pub(crate) sigma_mm: [f32; 3],
+    pub(crate) has_sigma: c_int,
+}
+
+impl From<PixelPoint> for Pixel {
+    fn from(pixel: PixelPoint) -> Self {
+        Self {
+            u_px: pixel.u,
+            v_px: pixel.v,
+        }
+    }
+}
+
+impl From<Pixel> for PixelPoint {
+    fn from(pixel: Pixel) -> Self {
+        Self::new(pixel.u_px, pixel.v_px)
+    }
+}
+
+impl Sighting {
+    pub(crate) const fn pixel(self) -> PixelPoint {
+        PixelPoint::new(self.u_px, self.v_px)
+    }
+
+    pub(crate) const fn of_rust(self) -> (usize, PixelPoint) {
+        (self.camera, self.pixel())
+    }
+}
