@@ -10,8 +10,10 @@ use firmware_sim::storage::trust::{PublicKey, Trust};
 use ray_runtime::{Aligned, PixelPoint, RayBlob};
 use std::fmt::Write as _;
 use std::fs;
+use std::io::{Read as _, Write as _};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 use std::path::Path;
+use std::thread;
 
 static SMALL: &Aligned<[u8]> = &Aligned(*include_bytes!("../../data/golden/stereo-v3-small.rays"));
 static FAST: &Aligned<[u8]> = &Aligned(*include_bytes!("../../data/golden/stereo-v3-fast.rays"));
@@ -134,6 +136,49 @@ fn the_status_says_whether_the_calibration_still_fits() {
     assert_eq!(object["slots"][0]["state"], "holds");
 }
 
+/// An address where nobody listens: a port that was taken, and given back.
+fn nobody() -> String {
+    let (_listener, address) = listener();
+    address
+}
+
+fn listener() -> (TcpListener, String) {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    let address = format!("tcp:{}", listener.local_addr().unwrap());
+    (listener, address)
+}
+
+#[test]
+fn whoever_does_not_answer_as_a_device_is_told_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_silent, silent) = listener();
+    let (other, something_else) = listener();
+    let talker = thread::spawn(move || {
+        let (mut stream, _) = other.accept().unwrap();
+        let answer = b"HTTP/1.1 400 Bad Request\r\n\r\n";
+        stream.write_all(answer).unwrap();
+        // Until the other side has gone; how, is all the same.
+        let _ = stream.read_to_end(&mut Vec::new());
+    });
+    let cases: [(&str, &[&str]); 5] = [
+        (&nobody(), &["nothing listens there", "firmware-sim host"]),
+        (&silent, &["no answer", "within 2 s"]),
+        (
+            &something_else,
+            &["no device of this kind", "is the address right"],
+        ),
+        ("usb:3", &["no device address"]),
+        ("tcp:localhost", &["no device address"]),
+    ];
+    for (address, said) in cases {
+        let arguments = ["device", "--device", address, "--timeout", "2", "status"];
+        run(folder.path(), &arguments)
+            .assert_code(2)
+            .assert_says(said);
+    }
+    talker.join().unwrap();
+}
+
 #[test]
 fn what_cannot_be_done_is_said_and_nothing_is_written() {
     let folder = folder();
@@ -145,42 +190,13 @@ fn what_cannot_be_done_is_said_and_nothing_is_written() {
     let mut wide = "id,u_left,v_left,u_right,v_right\n".to_owned();
     wide += "a,1,2,3,4\nb,1,2,x,4\n";
     fs::write(path.join("bad.csv"), wide).unwrap();
-    // A port where nobody listens: taken, and given back.
-    let free = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
-    let nobody = format!("tcp:{}", free.local_addr().unwrap());
-    drop(free);
-    // A listener that never says anything, and one that speaks something else.
-    let silent = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
-    let silent_address = format!("tcp:{}", silent.local_addr().unwrap());
+    let nobody = nobody();
 
     let before = contents(path);
     let cases: &[(&[&str], &[&str])] = &[
         (
             &["device", "status"],
             &["--device is missing", "tcp:127.0.0.1:7777"],
-        ),
-        (
-            &["device", "--device", &nobody, "status"],
-            &["nothing listens there", "firmware-sim host"],
-        ),
-        (
-            &["device", "--device", "usb:3", "status"],
-            &["no device address"],
-        ),
-        (
-            &["device", "--device", "tcp:localhost", "status"],
-            &["no device address"],
-        ),
-        (
-            &[
-                "device",
-                "--device",
-                &silent_address,
-                "--timeout",
-                "1",
-                "status",
-            ],
-            &["no answer", "1 s"],
         ),
         (&["flash", "c.json", "--device", &address], &["c.json"]),
         (
@@ -227,7 +243,6 @@ fn what_cannot_be_done_is_said_and_nothing_is_written() {
         run(path, arguments).assert_code(2).assert_says(said);
         assert_eq!(contents(path), before, "{arguments:?}");
     }
-    drop(silent);
 
     // The device is as it was.
     ask(path, &address, "status")

@@ -228,9 +228,11 @@ impl DeviceClient {
         let mut is_device = false;
         loop {
             let frame = match self.next_frame(deadline) {
-                Err(ClientError::Timeout { .. } | ClientError::Closed { .. })
-                    if self.heard > 0 && !is_device =>
-                {
+                Err(
+                    ClientError::Timeout { .. }
+                    | ClientError::Closed { .. }
+                    | ClientError::Broken { .. },
+                ) if self.heard > 0 && !is_device => {
                     return Err(ClientError::NotADevice {
                         address: self.address.clone(),
                         bytes: self.heard,

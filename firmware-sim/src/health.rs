@@ -39,7 +39,7 @@ const SIGMAS_95: f32 = 1.96;
 /// wrong matches do not look like a shift.
 const CLIPPED_AT: f32 = 4.0;
 
-/// The gaps of the points measured so far; about 600 bytes.
+/// The gaps of the points measured so far; about 700 bytes.
 #[derive(Debug, Clone)]
 pub struct Health {
     points: u32,

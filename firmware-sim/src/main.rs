@@ -16,7 +16,7 @@ use firmware_sim::storage::trust::{PublicKey, Trust};
 
 /// A measuring device, simulated.
 ///
-/// Example: firmware-sim host --listen 127.0.0.1:7777 --flash-file rig.rays
+/// Example: firmware-sim host --listen 127.0.0.1:7777 --flash-file device.flash
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
@@ -33,8 +33,8 @@ enum Command {
     Qemu {
         #[command(flatten)]
         device: DeviceArguments,
-        /// Run this image instead of building one.
-        #[arg(long, value_name = "ELF")]
+        /// Run this image instead of building one; whose blobs it takes was settled when it was built.
+        #[arg(long, value_name = "ELF", conflicts_with = "public_key")]
         image: Option<PathBuf>,
     },
     /// What the runtime costs on a Cortex-M4F: instructions counted in QEMU, stack, code. The images

@@ -1,5 +1,5 @@
-//! The knots of a quantized table, blended as the small integers that they are: in a third of the
-//! instructions that numbers take, and the same bits on every target.
+//! The knots of a quantized table, blended as the small integers that they are: in fewer instructions
+//! than made into numbers first, and with the same bits on every target.
 
 use crate::PixelPoint;
 use crate::format::{PLACES_PER_CELL, Record};
