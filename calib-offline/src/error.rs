@@ -2,6 +2,7 @@
 
 use crate::alternating::AlternatingError;
 use crate::atomic_file::WriteError;
+use crate::compare::publication::ExperimentError;
 use crate::dataset::{CornersError, ManifestError, SufficiencyError};
 use crate::demo::DemoError;
 use crate::detect::DetectError;
@@ -9,7 +10,6 @@ use crate::detect::overlay::OverlayError;
 use crate::detect::ring_target::TargetError;
 use crate::detect::suspicion::LabelSuspicion;
 use crate::device::DeviceError;
-use crate::experiments::ExperimentError;
 use crate::export::ExportError;
 use crate::init::InitError;
 use crate::joint::EstimateError;

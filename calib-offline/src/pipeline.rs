@@ -4,10 +4,7 @@
 //! that cannot be what they claim; the joint estimate adjusts everything and looks at the views
 //! once more; held-out boards and the calibration itself judge it; the record says all of it.
 
-pub mod alternatingly;
-pub mod jointly;
 mod left_out;
-pub mod solution;
 mod summary;
 
 use crate::adjust::Observations;
@@ -23,12 +20,12 @@ use crate::error::{DATA_UNDETERMINED, Error, UsageError};
 use crate::evaluate::verdict::Thresholds;
 use crate::evaluate::{Folds, held_out};
 use crate::field::RayTable;
+use crate::methods::alternating::alternating_solution;
+use crate::methods::joint::joint_solution;
+use crate::methods::solution::{Solved, Task};
 use crate::progress::Progress;
 use crate::report::Calibration;
-use alternatingly::alternating_solution;
 use clap::ValueEnum;
-use jointly::joint_solution;
-use solution::{Solved, Task};
 
 /// Which estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -12,11 +12,11 @@ use calib_offline::alternating::start::StartKind;
 use calib_offline::alternating::{
     AlternatingError, AlternatingEstimate, AlternatingSettings, estimate,
 };
-use calib_offline::evaluate::truth::TruthErrors;
+use calib_offline::evaluate::known_points::TruthErrors;
 use calib_offline::geometry::RigidTransform;
 use calib_offline::init::rig::start_rig;
-use calib_offline::pipeline::alternatingly::alternating_solution;
-use calib_offline::pipeline::solution::Task;
+use calib_offline::methods::alternating::alternating_solution;
+use calib_offline::methods::solution::Task;
 use calib_offline::progress::Silent;
 use calib_offline::simulate::{MatchSet, OpticsKind, Scene};
 

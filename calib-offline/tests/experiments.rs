@@ -3,12 +3,12 @@
 mod common;
 
 use calib_offline::board::BoardSpec;
+use calib_offline::compare::publication::figures::figures;
+use calib_offline::compare::publication::methods::Method;
+use calib_offline::compare::publication::tables::tables;
+use calib_offline::compare::publication::words::text;
+use calib_offline::compare::publication::{Evaluation, ExperimentSettings, evaluate};
 use calib_offline::dataset::Dataset;
-use calib_offline::experiments::figures::figures;
-use calib_offline::experiments::methods::Method;
-use calib_offline::experiments::tables::tables;
-use calib_offline::experiments::words::text;
-use calib_offline::experiments::{Evaluation, ExperimentSettings, evaluate};
 use calib_offline::progress::Silent;
 use calib_offline::simulate::{OpticsKind, OutputSettings, Scene, SceneSettings, write_dataset};
 use common::{MANIFEST, contents, corners_csv, dataset, run};

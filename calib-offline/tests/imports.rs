@@ -13,7 +13,7 @@ const LAYERS: [&[&str]; 10] = [
     &["joint", "pinhole", "alternating"],
     &["device", "evaluate", "export", "matches", "pack", "report"],
     &["error"],
-    &["pipeline", "demo", "compare", "experiments"],
+    &["methods", "pipeline", "demo", "compare"],
     &["cli"],
 ];
 

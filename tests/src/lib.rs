@@ -10,7 +10,7 @@ use calib_offline::board::BoardSpec;
 use calib_offline::dataset::Dataset;
 use calib_offline::demo::known::Pair;
 use calib_offline::device::on_wire;
-use calib_offline::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
+use calib_offline::evaluate::known_points::{PointWithTruth, TruthErrors, compare_with_truth};
 use calib_offline::geometry::SensorSize;
 use calib_offline::pack::{AlignedBytes, PackSettings, Packed, pack};
 use calib_offline::pipeline::{CalibrateSettings, Checked, calibrate_corners, corners};

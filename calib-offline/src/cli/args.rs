@@ -1,7 +1,7 @@
 //! What can be written on the command line. Each help text starts with an example.
 
 use super::{
-    calibrate, compare, demo, detect, device, evaluate, export, flash, inspect, measure, pack,
+    calibrate, demo, detect, device, evaluate, export, flash, inspect, measure, methods, pack,
     simulate,
 };
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -46,7 +46,7 @@ pub enum Verb {
     /// Calibrate from a dataset: calibration.json, rig.rays and report.html
     Calibrate(calibrate::CalibrateArgs),
     /// Compare the ray field with a pinhole on the same boards
-    Compare(compare::CompareArgs),
+    Compare(methods::CompareArgs),
     /// Run the whole chain on the data that comes with the program
     Demo(demo::DemoArgs),
     /// Find the board's corners in a dataset's images: corners.csv

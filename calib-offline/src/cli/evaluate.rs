@@ -3,13 +3,15 @@
 use super::Outcome;
 use super::output::Console;
 use crate::atomic_file::{check_folder, check_writable, make_folder, write_set};
+use crate::compare::publication::figures::figures;
+use crate::compare::publication::paper::evaluate_set_up;
+use crate::compare::publication::tables::tables;
+use crate::compare::publication::words::{
+    COMPARABLE, PUBLISHED_DEVIATION_MM, PUBLISHED_MEAN_MM, text,
+};
+use crate::compare::publication::{Evaluation, ExperimentSettings, evaluate};
 use crate::dataset::Dataset;
 use crate::error::Error;
-use crate::experiments::figures::figures;
-use crate::experiments::paper::evaluate_set_up;
-use crate::experiments::tables::tables;
-use crate::experiments::words::{COMPARABLE, PUBLISHED_DEVIATION_MM, PUBLISHED_MEAN_MM, text};
-use crate::experiments::{Evaluation, ExperimentSettings, evaluate};
 use clap::Args;
 use serde::Serialize;
 use std::path::{Path, PathBuf};

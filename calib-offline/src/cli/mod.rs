@@ -5,7 +5,6 @@
 
 pub mod args;
 pub mod calibrate;
-pub mod compare;
 pub mod demo;
 pub mod detect;
 pub mod detect_target;
@@ -16,6 +15,7 @@ mod failure;
 pub mod flash;
 pub mod inspect;
 pub mod measure;
+pub mod methods;
 pub mod output;
 pub mod pack;
 pub mod place;
@@ -64,7 +64,7 @@ pub fn main() -> ExitCode {
 fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
     match verb {
         Verb::Calibrate(args) => calibrate::run(args, console, &crate::pipeline::calibrate),
-        Verb::Compare(args) => compare::run(args, console),
+        Verb::Compare(args) => methods::run(args, console),
         Verb::Demo(args) => demo::run(args, console),
         Verb::Detect(args) => recording::detect(args, console),
         Verb::Device(args) => device::run(args, console),

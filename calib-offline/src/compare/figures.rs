@@ -1,18 +1,18 @@
 //! The figures of each method from its rigs: each over what all methods have.
 
 use super::boards::{BoardScore, FoldScores, score_fold};
-use super::contender::Fitted;
 use super::record::{HeldOutFigures, MethodFigures, Ratios, Training, TruthFigures};
 use super::{Run, bootstrap};
 use crate::adjust::Observations;
 use crate::evaluate::Folds;
 use crate::evaluate::held_out::{BoardErrors, Fold};
+use crate::evaluate::known_points::{PointWithTruth, compare_with_truth};
 use crate::evaluate::reprojection::residuals;
-use crate::evaluate::truth::{PointWithTruth, compare_with_truth};
 use crate::field::Rig;
 use crate::geometry::{RigidTransform, rms};
 use crate::matches::KnownMatches;
 use crate::matches::source::{PointSource, RigSource};
+use crate::methods::Fitted;
 use nalgebra::Vector3;
 
 /// Median distance of the boards' middles from the first camera, mm.

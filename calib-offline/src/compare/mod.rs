@@ -4,10 +4,10 @@
 pub mod boards;
 pub mod bootstrap;
 pub mod conclusion;
-pub mod contender;
 #[cfg(test)]
 mod example;
 mod figures;
+pub mod publication;
 pub mod record;
 pub mod words;
 
@@ -19,10 +19,10 @@ use crate::dataset::{Dataset, stage};
 use crate::error::Error;
 use crate::evaluate::{Folds, estimate_folds};
 use crate::matches::read_known;
-use crate::pipeline::solution::folds_wanted;
+use crate::methods::solution::folds_wanted;
+use crate::methods::{CONTENDERS, Contender, Failure, Fitted, Shared};
 use crate::pipeline::{Corners, Method, camera_names, explained, offered};
 use crate::progress::Progress;
-use contender::{CONTENDERS, Contender, Failure, Fitted, Shared};
 use figures::{add_held_out, add_training, add_truth, without_outliers, working_distance_mm};
 use std::time::{Duration, Instant};
 

@@ -2,7 +2,7 @@
 
 use super::bootstrap::Ratio;
 use crate::evaluate::held_out::FailedFold;
-use crate::evaluate::truth::TruthErrors;
+use crate::evaluate::known_points::TruthErrors;
 use serde::Serialize;
 use std::time::Duration;
 

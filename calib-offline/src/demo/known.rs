@@ -1,6 +1,6 @@
 //! Matches of a simulated dataset, measured by the device's code and compared with their truth.
 
-use crate::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
+use crate::evaluate::known_points::{PointWithTruth, TruthErrors, compare_with_truth};
 use crate::matches::source::BlobSource;
 use crate::matches::{MatchesError, PointSource, Sighting, read_known};
 use nalgebra::Vector3;

@@ -7,11 +7,12 @@ pub mod centrality;
 pub mod cross_checks;
 pub mod half_data;
 pub mod held_out;
+pub mod known_points;
 pub mod measured_board;
 pub mod reprojection;
 pub mod resection;
 pub mod stage_axis;
-pub mod truth;
+
 pub mod verdict;
 pub mod working_volume;
 

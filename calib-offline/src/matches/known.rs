@@ -2,7 +2,7 @@
 
 use super::source::{Number, Sighting};
 use super::{MatchesError, read_matches};
-use crate::evaluate::truth::TruePoint;
+use crate::evaluate::known_points::TruePoint;
 use std::path::Path;
 
 /// Files of matches that may stand in a dataset, each with `NAME_truth.csv` beside it.

@@ -1,9 +1,9 @@
 //! What did not go into the estimate as it was recorded, and why, for the record.
 
-use super::solution::{Unused, unused};
 use super::summary::Parts;
 use crate::detect::verdict::Outcome;
 use crate::init::screening::{Finding, FindingKind};
+use crate::methods::solution::{Unused, unused};
 use crate::report::record::{LeftOut, Renumbered};
 
 /// Poses, views and corners that did not go in.

@@ -2,7 +2,6 @@
 
 use super::Corners;
 use super::left_out::{left_out, renumbered};
-use super::solution::Solution;
 use crate::adjust::Observations;
 use crate::dataset::identity::input_sha256;
 use crate::dataset::{Dataset, stage};
@@ -10,6 +9,7 @@ use crate::evaluate::half_data::HalfDataCheck;
 use crate::evaluate::verdict::{Figures, Thresholds, judge};
 use crate::evaluate::{CrossChecks, HeldOut, fit_stage_axes};
 use crate::geometry::rms;
+use crate::methods::solution::Solution;
 use crate::report::record::{
     Calibration, CornerRecord, EstimateRecord, HeldOutRecord, PoseRecord, SCHEMA, StageAxis,
 };

@@ -4,7 +4,7 @@ use super::methods::{Method, MethodRun};
 use super::target::{measure_all, middle};
 use crate::dataset::Dataset;
 use crate::error::Error;
-use crate::evaluate::truth::{PointWithTruth, TruePoint, TruthErrors, compare_with_truth};
+use crate::evaluate::known_points::{PointWithTruth, TruePoint, TruthErrors, compare_with_truth};
 use crate::geometry::{PixelPoint, best_placement, rms};
 use crate::matches::read_known;
 use crate::pipeline::camera_names;

@@ -187,7 +187,7 @@ fn known_words(known: &KnownExperiment) -> String {
     );
     for method in &known.methods {
         let errors = method.errors.as_ref();
-        let number = |of: fn(&crate::evaluate::truth::TruthErrors) -> f64| {
+        let number = |of: fn(&crate::evaluate::known_points::TruthErrors) -> f64| {
             errors.map_or("-".to_owned(), |e| short(of(e)))
         };
         let _ = writeln!(

@@ -3,10 +3,10 @@
 use super::MethodOutcome;
 use crate::adjust::Observations;
 use crate::alternating::{self, AlternatingEstimate, AlternatingSettings};
-use crate::compare::contender::Shared;
 use crate::field::Rig;
 use crate::geometry::{PixelPoint, Ray, RigidTransform, triangulate_pair, triangulate_rays};
 use crate::init::rig::start_rig;
+use crate::methods::Shared;
 use crate::pinhole::{PinholeRig, RigSettings, calibrate_rig};
 use nalgebra::Vector3;
 use serde::Serialize;

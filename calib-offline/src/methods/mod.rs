@@ -1,6 +1,10 @@
 //! The methods that are compared: each gives a rig from the same observations. A further method is
 //! one more entry of [`CONTENDERS`].
 
+pub mod alternating;
+pub mod joint;
+pub mod solution;
+
 use crate::adjust::Observations;
 use crate::adjust::robust::{relative_weights, reweight};
 use crate::board::BoardShape;
@@ -11,9 +15,9 @@ use crate::field::Rig;
 use crate::geometry::RigidTransform;
 use crate::init::rig::start_rig;
 use crate::joint::{Estimate, estimate_screened};
+use crate::methods::alternating::{estimate_alternating, estimate_rig};
+use crate::methods::joint::estimate_joint;
 use crate::pinhole::{Loss, PinholeError, RigSettings, Settings, calibrate_rig};
-use crate::pipeline::alternatingly::{estimate_alternating, estimate_rig};
-use crate::pipeline::jointly::estimate_joint;
 use std::collections::BTreeMap;
 
 /// What all methods are given: the views that agree with each other, as the joint estimate finds

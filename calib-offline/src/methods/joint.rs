@@ -1,6 +1,5 @@
 //! The joint estimate as a method of the pipeline.
 
-use super::Method;
 use super::solution::{FoldError, Solution, Solved, Task, folds_wanted};
 use crate::adjust::{Observations, StopReason};
 use crate::error::Error;
@@ -9,6 +8,7 @@ use crate::evaluate::held_out::Estimated;
 use crate::evaluate::{cross_check, estimate_folds};
 use crate::init::rig::start_rig;
 use crate::joint::{Estimate, EstimateError, estimate, estimate_screened};
+use crate::pipeline::Method;
 use crate::progress::Progress;
 use crate::report::record::ChoicesRecord;
 

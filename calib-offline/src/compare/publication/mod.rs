@@ -23,12 +23,12 @@ pub mod tables;
 pub mod target;
 pub mod words;
 
-use crate::compare::contender::Shared;
 use crate::dataset::Dataset;
 use crate::dataset::corners::poses;
 use crate::dataset::stage::{entry, placements};
 use crate::detect::DetectSettings;
 use crate::error::Error;
+use crate::methods::Shared;
 use crate::pipeline::{self, camera_names, explained, offered};
 use crate::progress::Progress;
 use methods::{Method, MethodRun};

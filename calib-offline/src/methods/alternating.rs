@@ -1,6 +1,5 @@
 //! The published procedure as a method of the pipeline.
 
-use super::Method;
 use super::solution::{FoldError, Solution, Solved, Task, folds_wanted};
 use crate::adjust::Observations;
 use crate::adjust::robust::{relative_weights, reweight};
@@ -14,6 +13,7 @@ use crate::evaluate::held_out::Estimated;
 use crate::evaluate::reprojection::residuals;
 use crate::field::{BaseLens, Rig};
 use crate::init::rig::{RigStart, start_rig};
+use crate::pipeline::Method;
 use crate::progress::Progress;
 use crate::report::record::AlternatingRecord;
 use nalgebra::Vector2;

@@ -1,6 +1,5 @@
 //! What a method found, whichever it was: all that the record, the report and a comparison need.
 
-use super::Method;
 use crate::adjust::Observations;
 use crate::alternating::rays::RaySource;
 use crate::board::BoardShape;
@@ -10,6 +9,7 @@ use crate::field::Rig;
 use crate::geometry::RigidTransform;
 use crate::init::InitError;
 use crate::init::screening::Finding;
+use crate::pipeline::Method;
 use crate::report::record::{AlternatingRecord, ChoicesRecord};
 use nalgebra::Vector2;
 

@@ -2,10 +2,10 @@
 
 mod common;
 
-use calib_offline::compare::contender::{CONTENDERS, Contender, Failure};
 use calib_offline::compare::{compare_methods, words};
 use calib_offline::dataset::Dataset;
 use calib_offline::detect::DetectSettings;
+use calib_offline::methods::{CONTENDERS, Contender, Failure};
 use calib_offline::pipeline;
 use calib_offline::progress::Silent;
 use common::{MANIFEST, contents, corners_csv, dataset, run};
