@@ -1,5 +1,6 @@
 //! Files are written whole or not at all: first beside their place, then renamed into it.
 
+use crate::remedy::Remedy;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -39,9 +40,8 @@ pub enum WriteError {
     },
 }
 
-impl WriteError {
-    /// What to do about it.
-    pub fn remedy(&self) -> Option<String> {
+impl Remedy for WriteError {
+    fn remedy(&self) -> Option<String> {
         let text = match self {
             Self::IsFolder { .. } => "name a file inside the folder",
             Self::NoFolder { .. } => "make the folder first, or choose another place",

@@ -2,6 +2,7 @@
 
 use crate::alternating::AlternatingError;
 use crate::atomic_file::WriteError;
+use crate::cli::usage_error::UsageError;
 use crate::compare::publication::ExperimentError;
 use crate::dataset::{CornersError, ManifestError, SufficiencyError};
 use crate::demo::DemoError;
@@ -14,12 +15,12 @@ use crate::export::ExportError;
 use crate::init::InitError;
 use crate::joint::EstimateError;
 use crate::matches::MatchesError;
-use crate::pack::PackError;
+use crate::pack::{BlobError, PackError};
 use crate::pinhole::PinholeError;
+use crate::remedy::Remedy;
 use crate::report::store::CalibrationError;
 use crate::simulate::SimulateError;
 use std::convert::Infallible;
-use std::path::PathBuf;
 
 /// Why a command did not do what it was asked for.
 #[derive(Debug, thiserror::Error)]
@@ -120,138 +121,6 @@ impl From<Infallible> for Error {
     }
 }
 
-/// Why a file is not a blob that this version reads.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum BlobError {
-    /// The system refused to read it.
-    #[error("{}: cannot be read", file.display())]
-    Read {
-        /// The file.
-        file: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// The runtime refused it.
-    #[error("{}: the runtime refuses it", file.display())]
-    Open {
-        /// The file.
-        file: PathBuf,
-        /// What the runtime said.
-        source: ray_runtime::OpenError,
-    },
-}
-
-/// A request that cannot be met.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum UsageError {
-    /// Something stands where the result is to be written.
-    #[error("{}: exists", path.display())]
-    Exists {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A file that is neither of the kinds that the command reads.
-    #[error("{}: is not {expected}", path.display())]
-    UnknownKind {
-        /// The file.
-        path: PathBuf,
-        /// What it could have been.
-        expected: &'static str,
-    },
-    /// There is no such file.
-    #[error("{}: does not exist", path.display())]
-    NotFound {
-        /// The place.
-        path: PathBuf,
-    },
-    /// A frame that the rig does not have.
-    #[error("the rig has no camera \"{name}\" whose frame could be used; it has {}", known.join(", "))]
-    UnknownFrame {
-        /// The name.
-        name: String,
-        /// The rig's cameras.
-        known: Vec<String>,
-    },
-    /// One camera cannot triangulate.
-    #[error("{}: has one camera, a point takes two", path.display())]
-    OneCamera {
-        /// The rig.
-        path: PathBuf,
-    },
-    /// A pose that the recording does not have.
-    #[error("there is no pose {pose} to leave out; the last is pose {last}")]
-    NoSuchPose {
-        /// The pose asked for.
-        pose: usize,
-        /// The last pose.
-        last: usize,
-    },
-    /// A device's verb without its address.
-    #[error("which device is meant? --device is missing")]
-    NoDevice,
-    /// A file that is to be flashed and is no blob.
-    #[error("{}: is a calibration, and a device takes blobs", path.display())]
-    NotPacked {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The input would be replaced by the output.
-    #[error("{}: is what the command reads", path.display())]
-    OutputIsInput {
-        /// The file.
-        path: PathBuf,
-    },
-}
-
-impl UsageError {
-    /// What to do about it.
-    pub fn remedy(&self) -> Option<String> {
-        let text = match self {
-            Self::Exists { .. } => "choose another place, or replace it with --force",
-            Self::UnknownKind { .. } | Self::NotFound { .. } => "check the path",
-            Self::UnknownFrame { .. } => {
-                "leave --frame out for the rig's own frame, or name one of its cameras"
-            }
-            Self::OneCamera { .. } => {
-                "calibrate two cameras together; a single one gives rays only"
-            }
-            Self::NoSuchPose { .. } => "poses count from 0; see calib-offline inspect DATASET",
-            Self::NoDevice => "give its address, such as --device tcp:127.0.0.1:7777",
-            Self::NotPacked { .. } => {
-                "pack it first: calib-offline pack calibration.json -o rig.rays"
-            }
-            Self::OutputIsInput { .. } => "choose another place with -o",
-        };
-        Some(text.to_owned())
-    }
-}
-
-impl BlobError {
-    /// What to do about it.
-    pub fn remedy(&self) -> Option<String> {
-        use ray_runtime::OpenError;
-        let text = match self {
-            Self::Read { .. } => "check the path and the permissions",
-            Self::Open { source, .. } => match source {
-                OpenError::Truncated { .. } => "the file is cut off: copy it again, binary",
-                OpenError::BadMagic { .. } => {
-                    "this is no .rays file: write one with calib-offline pack"
-                }
-                OpenError::WrongVersion { .. } => {
-                    "pack the calibration again with this version, or read it with the one that wrote it"
-                }
-                OpenError::TrailingBytes { .. } | OpenError::BadCrc { .. } => {
-                    "the file was damaged on the way: copy it again, binary"
-                }
-                _ => "pack the calibration again",
-            },
-        };
-        Some(text.to_owned())
-    }
-}
-
 /// The exit code where the data cannot determine the answer.
 pub const DATA_UNDETERMINED: u8 = 3;
 
@@ -288,78 +157,46 @@ impl Error {
             | Self::Usage(_) => 2,
         }
     }
+}
 
-    /// What to do about it.
-    pub fn remedy(&self) -> Option<String> {
-        match self {
-            Self::Manifest(error) => error.remedy(),
-            Self::Corners(error) => error.remedy(),
-            Self::Sufficiency(error) => error.remedy(),
-            Self::FewImages { .. } => Some(
+impl Remedy for Error {
+    fn remedy(&self) -> Option<String> {
+        let text = match self {
+            Self::Manifest(error) => return error.remedy(),
+            Self::Corners(error) => return error.remedy(),
+            Self::Detect(error) => return error.remedy(),
+            Self::Overlay(error) => return error.remedy(),
+            Self::Target(error) => return error.remedy(),
+            Self::Simulate(error) => return error.remedy(),
+            Self::Sufficiency(error) => return error.remedy(),
+            Self::Labels { suspicion, .. } => return suspicion.remedy(),
+            Self::Calibration(error) => return error.remedy(),
+            Self::Blob(error) => return error.remedy(),
+            Self::Matches(error) => return error.remedy(),
+            Self::Pack(error) => return error.remedy(),
+            Self::Export(error) => return error.remedy(),
+            Self::Device(error) => return error.remedy(),
+            Self::Experiment(error) => return error.remedy(),
+            Self::Write(error) => return error.remedy(),
+            Self::Usage(error) => return error.remedy(),
+            Self::Json(_) | Self::Demo(_) => return None,
+            Self::FewImages { .. } => {
                 "correct dataset.toml or the images as the reason says; calib-offline detect DATASET \
                  --overlay DIR gives the reason for every image"
-                    .to_owned(),
-            ),
-            Self::Labels { suspicion, .. } => Some(suspicion.remedy()),
-            Self::Detect(DetectError::NoImages) => {
-                Some("add images = \"folder/*.png\" to each [[camera]] of dataset.toml".to_owned())
             }
-            Self::Detect(DetectError::BrokenImage { source, .. }) => Some(source.remedy()),
-            Self::Json(_) | Self::Demo(_) => None,
-            Self::Detect(_) => Some(
-                "look at the images with --overlay DIR; a board with an odd and an even number of corners cannot be turned unnoticed"
-                    .to_owned(),
-            ),
-            Self::Target(error) => error.remedy(),
-            Self::Experiment(error) => Some(error.remedy()),
-            Self::Overlay(_) => Some("choose another folder for --overlay".to_owned()),
-            Self::Simulate(_) => Some("see calib-offline simulate --help".to_owned()),
-            Self::Init(_) | Self::Estimate(_) => Some(
+            Self::Init(_) | Self::Estimate(_) => {
                 "look at the corners with calib-offline inspect, and at the images with detect \
                  --overlay; check rows, cols and the image size in dataset.toml, and record the \
                  board at more tilts and distances"
-                    .to_owned(),
-            ),
-            Self::Pinhole(_) => Some(
+            }
+            Self::Pinhole(_) => {
                 "leave the baseline out: calib-offline calibrate makes no assumption about the lens"
-                    .to_owned(),
-            ),
-            Self::Alternating(_) => Some(
+            }
+            Self::Alternating(_) => {
                 "leave --method out: the joint estimate takes all views together; or add boards at \
                  other distances"
-                    .to_owned(),
-            ),
-            Self::Calibration(error) => error.remedy(),
-            Self::Blob(error) => error.remedy(),
-            Self::Matches(error) => error.remedy(),
-            Self::Pack(error) => Some(pack_remedy(error)),
-            Self::Export(error) => Some(error.remedy()),
-            Self::Device(error) => error.remedy(),
-            Self::Write(error) => error.remedy(),
-            Self::Usage(error) => error.remedy(),
-        }
-    }
-}
-
-fn pack_remedy(error: &PackError) -> String {
-    match error {
-        PackError::BadSetting { .. } => "give a bound in pixels such as 0.001".to_owned(),
-        PackError::BoundNotReached { best_px, .. } => {
-            format!(
-                "ask for more: --max-error-px {:.1e} or above",
-                1.1 * best_px
-            )
-        }
-        PackError::TooFewBytes { need, .. } => format!(
-            "allow {need} bytes, a larger --max-error-px, or leave the uncertainty out with --no-uncertainty"
-        ),
-        PackError::NothingCalibrated { .. } => {
-            "calibrate with corners over more of the sensor".to_owned()
-        }
-        _ => {
-            "check the lengths and the camera names with calib-offline inspect: a blob holds up to \
-              a kilometer and needs names that differ"
-                .to_owned()
-        }
+            }
+        };
+        Some(text.to_owned())
     }
 }

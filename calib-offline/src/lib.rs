@@ -24,5 +24,6 @@ pub mod pack;
 pub mod pinhole;
 pub mod pipeline;
 pub mod progress;
+pub mod remedy;
 pub mod report;
 pub mod simulate;

@@ -9,6 +9,7 @@ mod summary;
 
 use crate::adjust::Observations;
 use crate::alternating::rays::RaySource;
+use crate::cli::usage_error::UsageError;
 use crate::dataset::corners::{load_corners, poses};
 use crate::dataset::split::without_excluded;
 use crate::dataset::sufficiency::{SufficiencyError, check_sufficiency};
@@ -16,7 +17,7 @@ use crate::dataset::{Dataset, View, stage};
 use crate::detect::suspicion::suspicious_labels;
 use crate::detect::verdict::Outcome;
 use crate::detect::{self, DetectSettings};
-use crate::error::{DATA_UNDETERMINED, Error, UsageError};
+use crate::error::{DATA_UNDETERMINED, Error};
 use crate::evaluate::verdict::Thresholds;
 use crate::evaluate::{Folds, held_out};
 use crate::field::RayTable;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// From the bottom up; a module may import those of its own layer and of layers before it.
 const LAYERS: [&[&str]; 10] = [
-    &["geometry", "progress", "atomic_file", "in_order"],
+    &["geometry", "progress", "atomic_file", "in_order", "remedy"],
     &["board", "dataset"],
     &["detect", "simulate", "field"],
     &["adjust"],

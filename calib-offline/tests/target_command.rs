@@ -5,6 +5,7 @@ mod common;
 use calib_offline::dataset::{Dataset, load_markers};
 use calib_offline::detect::ring_target::{TargetSettings, join_markers, target_views};
 use calib_offline::progress::Silent;
+use calib_offline::remedy::Remedy as _;
 use common::{contents, run};
 use std::collections::BTreeMap;
 use std::fs;

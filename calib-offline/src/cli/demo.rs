@@ -3,6 +3,7 @@
 use super::Outcome;
 use super::calibrate::{FILES, Written, pack_settings, say_what_is_used, write_results};
 use super::output::Console;
+use super::usage_error::UsageError;
 use crate::adjust::Observations;
 use crate::atomic_file::{self, check_folder};
 use crate::dataset::Dataset;
@@ -11,9 +12,9 @@ use crate::demo::known::measure_known;
 use crate::demo::page::{Entry, page};
 use crate::demo::unseen::measure_unseen;
 use crate::demo::{DemoError, DeviceCheck, Measured, words};
-use crate::error::{Error, UsageError};
+use crate::error::Error;
 use crate::evaluate::Folds;
-use crate::pack::AlignedBytes;
+use crate::pack::{AlignedBytes, BlobError};
 use crate::pipeline::{self, CalibrateSettings, Checked};
 use crate::report::facts::Facts;
 use crate::report::record::Grade;
@@ -199,7 +200,7 @@ fn measure(
 
 fn read(file: &Path) -> Result<AlignedBytes, Error> {
     crate::pack::read_aligned(file).map_err(|source| {
-        Error::Blob(crate::error::BlobError::Read {
+        Error::Blob(BlobError::Read {
             file: file.to_owned(),
             source,
         })

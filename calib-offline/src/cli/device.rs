@@ -2,9 +2,10 @@
 
 use super::Outcome;
 use super::output::Console;
+use super::usage_error::UsageError;
 use crate::dataset::identity::hex;
 use crate::device::{DeviceError, DeviceState, connect, state_in_words};
-use crate::error::{Error, UsageError};
+use crate::error::Error;
 use clap::{Args, Subcommand};
 use firmware_sim::client::DeviceClient;
 use serde::Serialize;

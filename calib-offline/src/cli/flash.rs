@@ -3,9 +3,11 @@
 use super::Outcome;
 use super::output::Console;
 use super::rig_file::{RigFile, open};
+use super::usage_error::UsageError;
 use crate::dataset::identity::hex;
 use crate::device::{DeviceError, connect};
-use crate::error::{BlobError, Error, UsageError};
+use crate::error::Error;
+use crate::pack::BlobError;
 use crate::progress::Progress;
 use clap::Args;
 use firmware_sim::client::{FlashOptions, FlashProgress};

@@ -5,9 +5,10 @@ use super::Outcome;
 use super::output::Console;
 use super::place::check_file;
 use super::rig_file::{RigFile, open};
+use super::usage_error::UsageError;
 use crate::atomic_file::{PendingFile, WriteError};
 use crate::device::{DeviceSource, connect};
-use crate::error::{Error, UsageError};
+use crate::error::Error;
 use crate::matches::source::{BlobSource, PointSource, RigSource};
 use crate::matches::{
     MatchesError, MeasureSummary, POINTS_HEADER, StreamError, measure_batches, measure_stream,

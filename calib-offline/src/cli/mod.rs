@@ -24,6 +24,7 @@ mod recording;
 mod rig_file;
 pub mod settings;
 pub mod simulate;
+pub mod usage_error;
 
 use crate::error::Error;
 use args::{Cli, Verb};

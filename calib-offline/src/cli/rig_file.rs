@@ -1,7 +1,8 @@
 //! A rig from a file: a blob or a calibration, told apart by how the file begins.
 
-use crate::error::{BlobError, Error, UsageError};
-use crate::pack::AlignedBytes;
+use super::usage_error::UsageError;
+use crate::error::Error;
+use crate::pack::{AlignedBytes, BlobError};
 use crate::report::Calibration;
 use ray_runtime::RayBlob;
 use ray_runtime::format::MAGIC;

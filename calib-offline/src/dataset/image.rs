@@ -1,6 +1,7 @@
 //! Gray images: PNG, JPEG, TIFF, BMP, PGM of 8 or 16 bits, as numbers to measure in.
 
 use crate::geometry::SensorSize;
+use crate::remedy::Remedy;
 use image::{DynamicImage, ImageReader};
 use std::path::{Path, PathBuf};
 
@@ -49,25 +50,24 @@ pub enum ImageError {
     },
 }
 
-impl ImageError {
-    /// What to do about it.
-    pub fn remedy(&self) -> String {
-        match self {
+impl Remedy for ImageError {
+    fn remedy(&self) -> Option<String> {
+        let text = match self {
             Self::Unreadable { .. } | Self::Undecodable { .. } => {
                 "copy the image again; or leave the pose out with exclude under [dataset], or take \
                  the image out of the camera's list (image_list, with \"\" in its place)"
             }
-            Self::WrongSize { found, expected, .. }
-                if (found.width, found.height) == (expected.height, expected.width) =>
-            {
+            Self::WrongSize {
+                found, expected, ..
+            } if (found.width, found.height) == (expected.height, expected.width) => {
                 "width and height swapped? Correct them in dataset.toml"
             }
             Self::WrongSize { .. } => {
                 "correct width and height of this camera in dataset.toml, or use the images as they \
                  came from the sensor (not scaled, not cropped)"
             }
-        }
-        .to_owned()
+        };
+        Some(text.to_owned())
     }
 }
 

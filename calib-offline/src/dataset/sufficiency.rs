@@ -2,6 +2,7 @@
 
 use super::corners::poses;
 use super::{Corner, Dataset, View};
+use crate::remedy::Remedy;
 
 /// Fewest poses of the board that determine a camera: with two, the focal length of a general
 /// view is fixed only if nothing else is unknown.
@@ -66,9 +67,8 @@ pub enum SufficiencyError {
     },
 }
 
-impl SufficiencyError {
-    /// What to do about it.
-    pub fn remedy(&self) -> Option<String> {
+impl Remedy for SufficiencyError {
+    fn remedy(&self) -> Option<String> {
         let text = match self {
             Self::NoCorners => {
                 "check with calib-offline inspect, and look at the images with detect --overlay"

@@ -30,6 +30,7 @@ use crate::dataset::image::{GrayImage, ImageError};
 use crate::dataset::{Corner, Dataset, View};
 use crate::geometry::{PixelPoint, SensorSize};
 use crate::progress::Progress;
+use crate::remedy::Remedy;
 use border::Borders;
 use chessboard::{ChessTopologicalDetector, ChessboardDetector};
 use consistency::{ConsistencyError, UnsettledView};
@@ -136,6 +137,19 @@ pub enum DetectError {
     /// The images cannot be numbered alike.
     #[error(transparent)]
     Consistency(#[from] ConsistencyError),
+}
+
+impl Remedy for DetectError {
+    fn remedy(&self) -> Option<String> {
+        let text = match self {
+            Self::NoImages => "add images = \"folder/*.png\" to each [[camera]] of dataset.toml",
+            Self::BrokenImage { source, .. } => return source.remedy(),
+            Self::Consistency(_) => {
+                "look at the images with --overlay DIR; a board with an odd and an even number of corners cannot be turned unnoticed"
+            }
+        };
+        Some(text.to_owned())
+    }
 }
 
 /// An image to look at.

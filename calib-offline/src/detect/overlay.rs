@@ -6,6 +6,7 @@ use crate::dataset::image::GrayImage;
 use crate::dataset::{Corner, Dataset, View};
 use crate::in_order;
 use crate::progress::Progress;
+use crate::remedy::Remedy;
 use image::{Rgb, RgbImage};
 use nalgebra::{Matrix2, Vector2};
 use std::path::{Path, PathBuf};
@@ -132,6 +133,12 @@ pub enum OverlayError {
         /// What the encoder or the system said.
         source: image::ImageError,
     },
+}
+
+impl Remedy for OverlayError {
+    fn remedy(&self) -> Option<String> {
+        Some("choose another folder for --overlay".to_owned())
+    }
 }
 
 /// Writes the overlay of every image that can be read to `CAMERA_POSE.png` in the folder, which is

@@ -8,6 +8,7 @@
 use super::epipolar::{FundamentalMatrix, Match};
 use super::matches_of;
 use crate::dataset::{Corner, Dataset, View};
+use crate::remedy::Remedy;
 use std::collections::BTreeMap;
 
 /// Another labelling explains the corners if their median distance from the epipolar lines shrinks
@@ -71,10 +72,9 @@ pub enum LabelSuspicion {
     },
 }
 
-impl LabelSuspicion {
-    /// What to do about it.
-    pub fn remedy(&self) -> String {
-        match self {
+impl Remedy for LabelSuspicion {
+    fn remedy(&self) -> Option<String> {
+        let text = match self {
             Self::Mirrored { .. } => {
                 "number rows and columns alike for all views, and use images as they came from the \
                  sensor; a camera that looks into a mirror cannot be calibrated with one that does not"
@@ -86,8 +86,8 @@ impl LabelSuspicion {
             Self::OutOfStep { .. } => {
                 "number the poses alike in both cameras; an image may be missing in one of them"
             }
-        }
-        .to_owned()
+        };
+        Some(text.to_owned())
     }
 }
 

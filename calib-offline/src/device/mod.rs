@@ -10,6 +10,7 @@ pub use points::{DeviceSource, on_wire};
 pub use state::{BlobState, DeviceState, SlotState};
 pub use words::state_in_words;
 
+use crate::remedy::Remedy;
 use firmware_sim::client::{ClientError, DeviceClient};
 use firmware_sim::protocol::Refusal;
 use std::time::Duration;
@@ -50,9 +51,8 @@ pub enum DeviceError {
     },
 }
 
-impl DeviceError {
-    /// What to do about it.
-    pub fn remedy(&self) -> Option<String> {
+impl Remedy for DeviceError {
+    fn remedy(&self) -> Option<String> {
         let text = match self {
             Self::Client(error) => return client_remedy(error).map(str::to_owned),
             Self::NoBlob { .. } => {

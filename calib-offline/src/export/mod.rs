@@ -9,6 +9,7 @@ mod uf2;
 
 pub use uf2::BLOCK_LEN as UF2_BLOCK_LEN;
 
+use crate::remedy::Remedy;
 /// The form to write.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Form {
@@ -75,10 +76,9 @@ pub enum ExportError {
     },
 }
 
-impl ExportError {
-    /// What to do about it.
-    pub fn remedy(&self) -> String {
-        match self {
+impl Remedy for ExportError {
+    fn remedy(&self) -> Option<String> {
+        let text = match self {
             Self::Misaligned { multiple, .. } => format!(
                 "choose a multiple of {multiple}: the start of a flash sector is one, and the runtime reads the blob in place"
             ),
@@ -92,7 +92,8 @@ impl ExportError {
                     .to_owned()
             }
             Self::NeedlessOption { option, .. } => format!("leave {option} out"),
-        }
+        };
+        Some(text)
     }
 }
 

@@ -1,5 +1,6 @@
 //! What can be wrong with a file of matches.
 
+use crate::remedy::Remedy;
 use std::path::PathBuf;
 
 /// Why `MATCHES.csv` was not accepted.
@@ -147,9 +148,8 @@ pub enum RowProblem {
     },
 }
 
-impl MatchesError {
-    /// What to do about it.
-    pub fn remedy(&self) -> Option<String> {
+impl Remedy for MatchesError {
+    fn remedy(&self) -> Option<String> {
         let text = match self {
             Self::Read { .. } => "check the path and the permissions",
             Self::Empty { .. } => "write the header and one match per line",

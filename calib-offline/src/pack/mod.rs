@@ -9,6 +9,7 @@
 //! compared with the calibration's (`sigma_error`).
 
 mod aligned_bytes;
+mod blob_error;
 mod encode;
 mod field_rows;
 mod monomials;
@@ -24,6 +25,7 @@ mod table;
 mod uncertainty;
 
 pub use aligned_bytes::{AlignedBytes, read_aligned};
+pub use blob_error::BlobError;
 pub use nearest::{LOOSEST_PX, pack_nearest, pack_within_bytes};
 pub use proof::Proof;
 pub use sigma_error::{Deviation, PackedPair};
@@ -31,6 +33,7 @@ pub use sigma_error::{Deviation, PackedPair};
 use crate::field::Rig;
 use crate::geometry::{PixelPoint, SensorSize};
 use crate::in_order;
+use crate::remedy::Remedy;
 use ray_runtime::format::{Encoding, IDENTITY_LEN, MAX_CELLS, MAX_EXTENT_PX};
 use ray_runtime::{OpenError, RayBlob, SelfTestFailure};
 use serde::Serialize;
@@ -265,6 +268,32 @@ pub enum PackError {
         /// Bytes.
         bytes: usize,
     },
+}
+
+impl Remedy for PackError {
+    fn remedy(&self) -> Option<String> {
+        let text = match self {
+            Self::BadSetting { .. } => "give a bound in pixels such as 0.001".to_owned(),
+            Self::BoundNotReached { best_px, .. } => {
+                format!(
+                    "ask for more: --max-error-px {:.1e} or above",
+                    1.1 * best_px
+                )
+            }
+            Self::TooFewBytes { need, .. } => format!(
+                "allow {need} bytes, a larger --max-error-px, or leave the uncertainty out with --no-uncertainty"
+            ),
+            Self::NothingCalibrated { .. } => {
+                "calibrate with corners over more of the sensor".to_owned()
+            }
+            _ => {
+                "check the lengths and the camera names with calib-offline inspect: a blob holds up to \
+                 a kilometer and needs names that differ"
+                    .to_owned()
+            }
+        };
+        Some(text)
+    }
 }
 
 /// Packs a rig.

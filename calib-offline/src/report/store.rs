@@ -5,6 +5,7 @@ use super::Calibration;
 use super::record::SCHEMA;
 use crate::field::polynomial::{MAX_DEGREE, term_count};
 use crate::field::{CalibratedCamera, PairUncertainty, SmoothMap};
+use crate::remedy::Remedy;
 use ray_runtime::format::IDENTITY_LEN;
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
@@ -59,9 +60,8 @@ struct OnlySchema {
     schema: String,
 }
 
-impl CalibrationError {
-    /// What to do about it.
-    pub fn remedy(&self) -> Option<String> {
+impl Remedy for CalibrationError {
+    fn remedy(&self) -> Option<String> {
         let text = match self {
             Self::Read { .. } => "check the path and the permissions",
             Self::Json { .. } | Self::Inconsistent { .. } => {

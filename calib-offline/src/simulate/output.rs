@@ -22,6 +22,7 @@ use super::render::RenderSettings;
 use super::scene::Scene;
 use super::settings::SceneError;
 use super::tables::{corner_table, manifest, match_table, truth, truth_table};
+use crate::remedy::Remedy;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -151,6 +152,12 @@ pub enum SimulateError {
         /// Why.
         source: image::ImageError,
     },
+}
+
+impl Remedy for SimulateError {
+    fn remedy(&self) -> Option<String> {
+        Some("see calib-offline simulate --help".to_owned())
+    }
 }
 
 /// Simulates into `folder`, which appears whole or not at all.

@@ -1,7 +1,7 @@
 use super::*;
 use crate::cli::settings::{Narration, Settings};
+use crate::cli::usage_error::UsageError;
 use crate::dataset::{CornersError, SufficiencyError};
-use crate::error::UsageError;
 use crate::report::example;
 use std::fs;
 

@@ -31,6 +31,7 @@ use crate::error::Error;
 use crate::methods::Shared;
 use crate::pipeline::{self, camera_names, explained, offered};
 use crate::progress::Progress;
+use crate::remedy::Remedy;
 use methods::{Method, MethodRun};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -117,15 +118,14 @@ pub enum ExperimentError {
     },
 }
 
-impl ExperimentError {
-    /// What to do about it.
-    pub fn remedy(&self) -> String {
-        match self {
+impl Remedy for ExperimentError {
+    fn remedy(&self) -> Option<String> {
+        let text = match self {
             Self::Truth { .. } => {
                 "simulate the dataset anew, or delete the file: experiments that need it are then left out"
-                    .to_owned()
             }
-        }
+        };
+        Some(text.to_owned())
     }
 }
 

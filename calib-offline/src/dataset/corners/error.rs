@@ -3,6 +3,7 @@
 use super::{HEADER, HEADER_WITH_SIGMA};
 use crate::dataset::Dataset;
 use crate::geometry::{PixelPoint, SensorSize};
+use crate::remedy::Remedy;
 use std::path::PathBuf;
 
 /// Why `corners.csv` was not accepted.
@@ -175,9 +176,8 @@ pub enum CornersError {
     },
 }
 
-impl CornersError {
-    /// What to do about it.
-    pub fn remedy(&self) -> Option<String> {
+impl Remedy for CornersError {
+    fn remedy(&self) -> Option<String> {
         let text = match self {
             Self::Read { .. } => "check the path and the permissions".to_owned(),
             Self::NotText { .. } => {

@@ -2,6 +2,7 @@ use super::*;
 use crate::board::BoardSpec;
 use crate::dataset::{CameraSpec, StageSpec};
 use crate::geometry::SensorSize;
+use crate::remedy::Remedy as _;
 
 fn dataset() -> Dataset {
     Dataset {

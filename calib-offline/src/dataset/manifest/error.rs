@@ -2,6 +2,7 @@
 
 use super::target::TargetProblem;
 use crate::dataset::Dataset;
+use crate::remedy::Remedy;
 use std::path::PathBuf;
 
 /// Why `dataset.toml` was not accepted.
@@ -298,9 +299,8 @@ pub enum ManifestError {
     },
 }
 
-impl ManifestError {
-    /// What to do about it.
-    pub fn remedy(&self) -> Option<String> {
+impl Remedy for ManifestError {
+    fn remedy(&self) -> Option<String> {
         let text = match self {
             Self::NotFound { .. } => {
                 "give the folder that holds dataset.toml, or write one: [board] with rows, cols, square_mm, and a [[camera]] with name, width, height, images"

@@ -1,4 +1,5 @@
 use super::*;
+use crate::remedy::Remedy as _;
 use std::fs;
 
 const BOARD: &str = "[board]\nkind = \"chessboard\"\nrows = 15\ncols = 13\nsquare_mm = 10.0\n";

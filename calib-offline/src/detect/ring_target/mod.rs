@@ -29,6 +29,7 @@ use super::{DetectError, Job, all_loaded};
 use crate::dataset::image::GrayImage;
 use crate::dataset::{Corner, CornersError, Dataset, TargetSpec, View, load_markers};
 use crate::progress::Progress;
+use crate::remedy::Remedy;
 use rayon::prelude::*;
 
 /// Choices in the search for the target.
@@ -87,15 +88,14 @@ pub enum TargetError {
     Markers(#[from] CornersError),
 }
 
-impl TargetError {
-    /// What to do about it.
-    pub fn remedy(&self) -> Option<String> {
+impl Remedy for TargetError {
+    fn remedy(&self) -> Option<String> {
         let text = match self {
             Self::NoTarget => {
                 "describe it: [target] with kind = \"rings\", rows, cols, pitch_mm, outer_radius_mm, direction_outer_radius_mm, direction"
             }
             Self::NoImages => "add target_images = \"target/left/*.png\" to each [[camera]]",
-            Self::Images(DetectError::BrokenImage { source, .. }) => return Some(source.remedy()),
+            Self::Images(DetectError::BrokenImage { source, .. }) => return source.remedy(),
             Self::Images(_) => return None,
             Self::AllRefused { .. } => {
                 "look at the images with calib-offline detect DATASET --target --overlay DIR"

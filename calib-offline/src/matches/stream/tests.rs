@@ -1,5 +1,6 @@
 use super::*;
 use crate::matches::source::{Point, Sighting};
+use crate::remedy::Remedy as _;
 use std::fmt::Write as _;
 
 /// x and y are the sums of the pixels, z the number of cameras. Pixels below zero are outside.

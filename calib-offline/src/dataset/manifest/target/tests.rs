@@ -1,4 +1,5 @@
 use super::super::Dataset;
+use crate::remedy::Remedy as _;
 use std::fs;
 
 const GOOD: &str = r#"[board]

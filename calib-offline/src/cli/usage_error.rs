@@ -1,0 +1,89 @@
+//! Requests that cannot be met.
+
+use crate::remedy::Remedy;
+use std::path::PathBuf;
+
+/// A request that cannot be met.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum UsageError {
+    /// Something stands where the result is to be written.
+    #[error("{}: exists", path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file that is neither of the kinds that the command reads.
+    #[error("{}: is not {expected}", path.display())]
+    UnknownKind {
+        /// The file.
+        path: PathBuf,
+        /// What it could have been.
+        expected: &'static str,
+    },
+    /// There is no such file.
+    #[error("{}: does not exist", path.display())]
+    NotFound {
+        /// The place.
+        path: PathBuf,
+    },
+    /// A frame that the rig does not have.
+    #[error("the rig has no camera \"{name}\" whose frame could be used; it has {}", known.join(", "))]
+    UnknownFrame {
+        /// The name.
+        name: String,
+        /// The rig's cameras.
+        known: Vec<String>,
+    },
+    /// One camera cannot triangulate.
+    #[error("{}: has one camera, a point takes two", path.display())]
+    OneCamera {
+        /// The rig.
+        path: PathBuf,
+    },
+    /// A pose that the recording does not have.
+    #[error("there is no pose {pose} to leave out; the last is pose {last}")]
+    NoSuchPose {
+        /// The pose asked for.
+        pose: usize,
+        /// The last pose.
+        last: usize,
+    },
+    /// A device's verb without its address.
+    #[error("which device is meant? --device is missing")]
+    NoDevice,
+    /// A file that is to be flashed and is no blob.
+    #[error("{}: is a calibration, and a device takes blobs", path.display())]
+    NotPacked {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The input would be replaced by the output.
+    #[error("{}: is what the command reads", path.display())]
+    OutputIsInput {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+impl Remedy for UsageError {
+    fn remedy(&self) -> Option<String> {
+        let text = match self {
+            Self::Exists { .. } => "choose another place, or replace it with --force",
+            Self::UnknownKind { .. } | Self::NotFound { .. } => "check the path",
+            Self::UnknownFrame { .. } => {
+                "leave --frame out for the rig's own frame, or name one of its cameras"
+            }
+            Self::OneCamera { .. } => {
+                "calibrate two cameras together; a single one gives rays only"
+            }
+            Self::NoSuchPose { .. } => "poses count from 0; see calib-offline inspect DATASET",
+            Self::NoDevice => "give its address, such as --device tcp:127.0.0.1:7777",
+            Self::NotPacked { .. } => {
+                "pack it first: calib-offline pack calibration.json -o rig.rays"
+            }
+            Self::OutputIsInput { .. } => "choose another place with -o",
+        };
+        Some(text.to_owned())
+    }
+}
