@@ -8,7 +8,7 @@
 
 use calib_offline::board::BoardSpec;
 use calib_offline::dataset::Dataset;
-use calib_offline::demo::known::Pair;
+use calib_offline::demo::device::Pair;
 use calib_offline::device::on_wire;
 use calib_offline::evaluate::known_points::{PointWithTruth, TruthErrors, compare_with_truth};
 use calib_offline::geometry::SensorSize;

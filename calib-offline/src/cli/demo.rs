@@ -7,13 +7,15 @@ use super::usage_error::UsageError;
 use crate::adjust::Observations;
 use crate::atomic_file::{self, check_folder};
 use crate::dataset::Dataset;
-use crate::demo::device::{check_cortex_m, check_simulated, corner_pairs};
-use crate::demo::known::measure_known;
+use crate::demo::device::{check_cortex_m, check_simulated, corner_pairs, known_pairs};
 use crate::demo::page::{Entry, page};
 use crate::demo::unseen::measure_unseen;
 use crate::demo::{DemoError, DeviceCheck, Measured, words};
 use crate::error::Error;
 use crate::evaluate::Folds;
+use crate::evaluate::known_points::KnownPoints;
+use crate::matches::source::BlobSource;
+use crate::matches::{PointSource, read_known};
 use crate::pack::{AlignedBytes, BlobError};
 use crate::pipeline::{self, CalibrateSettings, Checked};
 use crate::report::facts::Facts;
@@ -178,12 +180,16 @@ fn measure(
     let [_, rays, _] = &written.files;
     let bytes = read(rays)?;
     let blob = RayBlob::open(&bytes).map_err(DemoError::Open)?;
-    let (known_points, known_pairs) = measure_known(folder, &blob)?;
-    let pairs = if known_pairs.is_empty() {
-        corner_pairs(calibration)
-    } else {
-        known_pairs
-    };
+    let (mut known_points, mut pairs) = (Vec::new(), Vec::new());
+    // Without a frame there is always a source.
+    if let Some(source) = BlobSource::new(&blob, None) {
+        let known = read_known(folder, &source.cameras())?;
+        known_points.extend(known.iter().map(|known| KnownPoints::of(&source, known)));
+        pairs = known_pairs(&known);
+    }
+    if pairs.is_empty() {
+        pairs = corner_pairs(calibration);
+    }
     let mut devices = vec![check_simulated(&bytes, &pairs)?];
     let mut no_cortex_m = None;
     match check_cortex_m(&bytes, &pairs) {

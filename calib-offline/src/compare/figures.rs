@@ -6,14 +6,12 @@ use super::{Run, bootstrap};
 use crate::adjust::Observations;
 use crate::evaluate::Folds;
 use crate::evaluate::held_out::{BoardErrors, Fold};
-use crate::evaluate::known_points::{PointWithTruth, compare_with_truth};
+use crate::evaluate::known_points::{Points, beside_truth, compare_with_truth, measure};
 use crate::evaluate::reprojection::residuals;
-use crate::field::Rig;
 use crate::geometry::{RigidTransform, rms};
 use crate::matches::KnownMatches;
-use crate::matches::source::{PointSource, RigSource};
+use crate::matches::source::RigSource;
 use crate::methods::Fitted;
-use nalgebra::Vector3;
 
 /// Median distance of the boards' middles from the first camera, mm.
 pub(super) fn working_distance_mm(fitted: &Fitted, observations: &Observations) -> Option<f64> {
@@ -203,37 +201,23 @@ fn ratios(own: &[&BoardScore], first: &[&BoardScore]) -> Ratios {
 
 /// Points of matches whose truth is known, where every method has one.
 pub(super) fn add_truth(methods: &mut [MethodFigures], runs: &[Run], known: &[KnownMatches<f64>]) {
-    let rigs: Vec<Option<&Rig>> = runs
+    // Without a frame there is always a source.
+    let sources: Vec<Option<RigSource>> = runs
         .iter()
-        .map(|run| run.fitted.as_ref().ok().map(|fitted| &fitted.rig))
+        .map(|run| RigSource::new(&run.fitted.as_ref().ok()?.rig, None))
         .collect();
     for known in known {
-        let points: Vec<Option<Vec<Option<Vector3<f64>>>>> = rigs
+        let points: Vec<Option<Points>> = sources
             .iter()
-            .map(|rig| {
-                // Without a frame there is always a source.
-                let source = RigSource::new((*rig)?, None)?;
-                let point = |sightings: &Vec<_>| {
-                    let found = source.point(sightings).ok()?;
-                    Some(Vector3::from(found.point_mm))
-                };
-                Some(known.matches.iter().map(point).collect())
-            })
+            .map(|source| Some(measure(source.as_ref()?, &known.matches)))
             .collect();
         let is_common = |k: usize| points.iter().flatten().all(|own| own[k].is_some());
         for (figures, own) in methods.iter_mut().zip(&points) {
             let Some(own) = own else { continue };
-            let common: Vec<PointWithTruth> = own
-                .iter()
-                .zip(&known.truth)
-                .enumerate()
-                .filter(|(k, _)| is_common(*k))
-                .filter_map(|(_, (point, truth))| Some(truth.with((*point)?)))
-                .collect();
             figures.truth.push(TruthFigures {
                 file: known.file.clone(),
                 unanswered: own.iter().filter(|point| point.is_none()).count(),
-                errors: compare_with_truth(&common),
+                errors: compare_with_truth(&beside_truth(own, &known.truth, is_common)),
             });
         }
     }

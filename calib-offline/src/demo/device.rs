@@ -2,8 +2,8 @@
 //! last bit.
 
 use super::DemoError;
-use super::known::Pair;
 use crate::device::on_wire;
+use crate::matches::{KnownMatches, Sighting};
 use crate::report::Calibration;
 use firmware_sim::client::{ClientError, DeviceClient, FlashOptions};
 use firmware_sim::host::SimulatedDevice;
@@ -13,6 +13,9 @@ use ray_runtime::{MeasureError, PixelPoint, RayBlob};
 use serde::Serialize;
 use std::collections::HashMap;
 use std::net::{Ipv4Addr, SocketAddr};
+
+/// A match as a device measures it: two cameras' pixels.
+pub type Pair = [Sighting<f32>; 2];
 
 /// The answers of one device beside those of the host.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -109,6 +112,14 @@ fn on_host(blob: &RayBlob<'_>, pair: &Pair) -> Result<Point, u8> {
 
 fn bits(outcome: &Result<Point, u8>) -> Result<[Option<u32>; 7], u8> {
     outcome.map(|point| point.to_bits())
+}
+
+/// The matches of two cameras in files whose truth is known.
+pub fn known_pairs(known: &[KnownMatches<f32>]) -> Vec<Pair> {
+    let matches = known.iter().flat_map(|file| &file.matches);
+    matches
+        .filter_map(|sightings| Pair::try_from(&sightings[..]).ok())
+        .collect()
 }
 
 /// The corners that the first two cameras both saw, as matches.

@@ -3,17 +3,16 @@
 //! be those of the host to the last bit.
 
 pub mod device;
-pub mod known;
 pub mod page;
 pub mod unseen;
 pub mod words;
 
+use crate::evaluate::known_points::KnownPoints;
 use firmware_sim::client::ClientError;
 use ray_runtime::OpenError;
 use serde::Serialize;
 
 pub use device::DeviceCheck;
-pub use known::KnownPoints;
 pub use unseen::UnseenBoards;
 
 /// Everything measured on one dataset.

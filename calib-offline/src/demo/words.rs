@@ -1,7 +1,8 @@
 //! What was measured, line by line: for the terminal and for the page.
 
 use super::unseen::BoardFigures;
-use super::{DeviceCheck, KnownPoints, Measured, UnseenBoards};
+use super::{DeviceCheck, Measured, UnseenBoards};
+use crate::evaluate::known_points::KnownPoints;
 use crate::report::text::short;
 
 /// Name and fact, one pair per line.

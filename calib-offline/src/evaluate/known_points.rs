@@ -1,8 +1,11 @@
-//! Measured points against where they truly are, beside what a perfect calibration would do.
+//! Measured points against where they truly are, beside what a perfect calibration would do: for anything
+//! that turns matches into points.
 
 use crate::geometry::best_placement;
+use crate::matches::{KnownMatches, PointSource, Sighting, TruePoint};
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
+use rayon::prelude::*;
+use serde::Serialize;
 
 /// A measured point with its truth, one frame for all three, mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,35 +18,67 @@ pub struct PointWithTruth {
     pub oracle_mm: Vector3<f64>,
 }
 
-/// Where a point is, and what the true rays of its pixels give: a row of a table of true points, whose
-/// other columns are for other uses. Datum frame, mm.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-pub struct TruePoint {
-    x: f64,
-    y: f64,
-    z: f64,
-    x_oracle: f64,
-    y_oracle: f64,
-    z_oracle: f64,
+impl PointWithTruth {
+    /// What was measured of a point.
+    pub fn new(measured_mm: Vector3<f64>, truth: &TruePoint) -> Self {
+        Self {
+            measured_mm,
+            true_mm: truth.true_mm(),
+            oracle_mm: truth.oracle_mm(),
+        }
+    }
 }
 
-impl TruePoint {
-    /// Where it is.
-    pub fn true_mm(&self) -> Vector3<f64> {
-        Vector3::new(self.x, self.y, self.z)
-    }
+/// Points of matches, in their order, mm; `None` where there is none.
+pub type Points = Vec<Option<Vector3<f64>>>;
 
-    /// See [`PointWithTruth::oracle_mm`].
-    pub fn oracle_mm(&self) -> Vector3<f64> {
-        Vector3::new(self.x_oracle, self.y_oracle, self.z_oracle)
-    }
+/// Measures matches with anything that turns them into points.
+pub fn measure<S>(source: &S, matches: &[Vec<Sighting<S::Number>>]) -> Points
+where
+    S: PointSource + ?Sized,
+{
+    let point = |sightings: &Vec<_>| {
+        let found = source.point(sightings).ok()?;
+        Some(Vector3::from(found.point_mm.map(Into::into)))
+    };
+    matches.par_iter().map(point).collect()
+}
 
-    /// With what was measured of it.
-    pub fn with(&self, measured_mm: Vector3<f64>) -> PointWithTruth {
-        PointWithTruth {
-            measured_mm,
-            true_mm: self.true_mm(),
-            oracle_mm: self.oracle_mm(),
+/// Points beside their truth, of the matches (by place in the list) that are wanted and have a point.
+pub fn beside_truth(
+    points: &[Option<Vector3<f64>>],
+    truth: &[TruePoint],
+    is_wanted: impl Fn(usize) -> bool,
+) -> Vec<PointWithTruth> {
+    let pairs = points.iter().zip(truth).enumerate();
+    pairs
+        .filter(|(k, _)| is_wanted(*k))
+        .filter_map(|(_, (point, truth))| Some(PointWithTruth::new((*point)?, truth)))
+        .collect()
+}
+
+/// A file of matches whose truth is known, and what a source made of it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct KnownPoints {
+    /// The file's name.
+    pub file: String,
+    /// Matches in it.
+    pub matches: usize,
+    /// Matches without a point: outside the calibrated area, or with rays that do not meet.
+    pub without_point: usize,
+    /// How far the points are from the truth.
+    pub errors: Option<TruthErrors>,
+}
+
+impl KnownPoints {
+    /// Measures all of a file's matches.
+    pub fn of<S: PointSource + ?Sized>(source: &S, known: &KnownMatches<S::Number>) -> Self {
+        let points = beside_truth(&measure(source, &known.matches), &known.truth, |_| true);
+        Self {
+            file: known.file.clone(),
+            matches: known.matches.len(),
+            without_point: known.matches.len() - points.len(),
+            errors: compare_with_truth(&points),
         }
     }
 }

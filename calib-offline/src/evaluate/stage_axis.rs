@@ -2,25 +2,41 @@
 //! axis differ by rotations about it, and the axis is where those rotations leave points at rest.
 
 use crate::geometry::{RigidTransform, so3};
-use crate::report::record::{PoseRecord, StageAxis};
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Turns smaller than this say nothing of their axis, rad.
 const MIN_TURN_RAD: f64 = 1e-3;
 
+/// The axis that the boards of one placement turned about, rig frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StageAxis {
+    /// Number of the placement.
+    pub placement: usize,
+    /// Poses that it was found from.
+    pub poses: usize,
+    /// The point of the axis nearest to the boards' middle, mm.
+    pub point_mm: Vector3<f64>,
+    /// Unit vector along it.
+    pub direction: Vector3<f64>,
+    /// RMS over pairs of poses of the part of their turn that is not about the axis, rad.
+    pub wobble_rms_rad: f64,
+}
+
 /// One axis per placement, for the placements that have one.
 ///
-/// `placement_of` says which placement a pose number belongs to; poses without one are left out.
+/// `rig_from_board` has the number of each pose and where its board was; `placement_of` says which placement
+/// a pose number belongs to, and poses without one are left out.
 /// A placement with fewer than three poses, or that hardly turned, has no axis.
 pub fn fit_stage_axes(
-    poses: &[PoseRecord],
+    rig_from_board: &[(usize, RigidTransform)],
     placement_of: impl Fn(usize) -> Option<usize>,
 ) -> Vec<StageAxis> {
-    let mut placements: BTreeMap<usize, Vec<&PoseRecord>> = BTreeMap::new();
-    for pose in poses {
-        if let Some(placement) = placement_of(pose.pose) {
-            placements.entry(placement).or_default().push(pose);
+    let mut placements: BTreeMap<usize, Vec<RigidTransform>> = BTreeMap::new();
+    for (pose, board) in rig_from_board {
+        if let Some(placement) = placement_of(*pose) {
+            placements.entry(placement).or_default().push(*board);
         }
     }
     placements
@@ -29,16 +45,15 @@ pub fn fit_stage_axes(
         .collect()
 }
 
-fn fit(placement: usize, poses: &[&PoseRecord]) -> Option<StageAxis> {
+fn fit(placement: usize, poses: &[RigidTransform]) -> Option<StageAxis> {
     if poses.len() < 3 {
         return None;
     }
     let pairs = || {
-        poses.iter().enumerate().flat_map(|(i, a)| {
-            poses[i + 1..]
-                .iter()
-                .map(move |b| b.rig_from_board * a.rig_from_board.inverse())
-        })
+        poses
+            .iter()
+            .enumerate()
+            .flat_map(|(i, a)| poses[i + 1..].iter().map(move |b| *b * a.inverse()))
     };
     // Rotation vectors of all pairs, turned to one side: long ones know the direction best.
     let turns: Vec<Vector3<f64>> = pairs().map(|turn| so3::log(&turn.rotation)).collect();
@@ -86,10 +101,10 @@ fn resting_point(
     solution.iter().all(|v| v.is_finite()).then_some(solution)
 }
 
-fn centroid(poses: &[&PoseRecord]) -> Vector3<f64> {
+fn centroid(poses: &[RigidTransform]) -> Vector3<f64> {
     poses
         .iter()
-        .map(|pose| pose.rig_from_board.translation_mm)
+        .map(|pose| pose.translation_mm)
         .sum::<Vector3<f64>>()
         / poses.len() as f64
 }
@@ -97,15 +112,6 @@ fn centroid(poses: &[&PoseRecord]) -> Vector3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn record(pose: usize, rig_from_board: RigidTransform) -> PoseRecord {
-        PoseRecord {
-            pose,
-            rig_from_board,
-            rms_px: Vec::new(),
-            stage_angle_deg: None,
-        }
-    }
 
     fn turned(axis_point: Vector3<f64>, axis: Vector3<f64>, angle: f64) -> RigidTransform {
         let rotation = so3::exp(&(axis * angle));
@@ -120,8 +126,8 @@ mod tests {
     fn the_axis_that_boards_turned_about_is_found() {
         let axis = Vector3::new(0.1, 0.98, -0.05).normalize();
         let point = Vector3::new(55.0, 10.0, 330.0);
-        let poses: Vec<PoseRecord> = (0..9)
-            .map(|k| record(k, turned(point, axis, 0.17 * (k as f64 - 4.0))))
+        let poses: Vec<_> = (0..9)
+            .map(|k| (k, turned(point, axis, 0.17 * (k as f64 - 4.0))))
             .collect();
         let axes = fit_stage_axes(&poses, |pose| (pose < 8).then_some(3));
         assert_eq!(axes.len(), 1);
@@ -136,8 +142,8 @@ mod tests {
     #[test]
     fn boards_that_did_not_turn_have_no_axis() {
         let axis = Vector3::y();
-        let still: Vec<PoseRecord> = (0..5)
-            .map(|k| record(k, turned(Vector3::zeros(), axis, 0.0)))
+        let still: Vec<_> = (0..5)
+            .map(|k| (k, turned(Vector3::zeros(), axis, 0.0)))
             .collect();
         assert!(fit_stage_axes(&still, |_| Some(0)).is_empty());
         assert!(fit_stage_axes(&still[..2], |_| Some(0)).is_empty());

@@ -2,11 +2,36 @@
 
 use super::source::{Number, Sighting};
 use super::{MatchesError, read_matches};
-use crate::evaluate::known_points::TruePoint;
+use nalgebra::Vector3;
+use serde::Deserialize;
 use std::path::Path;
 
 /// Files of matches that may stand in a dataset, each with `NAME_truth.csv` beside it.
 const FILES: [&str; 2] = ["matches", "holdout"];
+
+/// Where a point is, and what the true rays of its pixels give: a row of a table of true points, whose
+/// other columns are for other uses. Datum frame, mm.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub struct TruePoint {
+    x: f64,
+    y: f64,
+    z: f64,
+    x_oracle: f64,
+    y_oracle: f64,
+    z_oracle: f64,
+}
+
+impl TruePoint {
+    /// Where it is.
+    pub fn true_mm(&self) -> Vector3<f64> {
+        Vector3::new(self.x, self.y, self.z)
+    }
+
+    /// What the true rays of the same pixels give: the limit that the noise of the pixels sets.
+    pub fn oracle_mm(&self) -> Vector3<f64> {
+        Vector3::new(self.x_oracle, self.y_oracle, self.z_oracle)
+    }
+}
 
 /// A file of matches whose truth is known.
 #[derive(Debug, Clone, PartialEq)]

@@ -14,7 +14,7 @@ mod stream;
 
 pub use error::MatchesError;
 pub use header::Columns;
-pub use known::{KnownMatches, read_known};
+pub use known::{KnownMatches, TruePoint, read_known};
 pub use list::read_matches;
 pub use source::{BatchSource, Number, PointSource, Sighting, Status};
 pub use stream::{MeasureSummary, StreamError, measure_batches, measure_stream};

@@ -190,7 +190,8 @@ fn pose_records(parts: &Parts, camera_count: usize) -> Vec<PoseRecord> {
 
 fn stage_axes(parts: &Parts, poses: &[PoseRecord]) -> Vec<StageAxis> {
     let all_poses = crate::dataset::corners::poses(&parts.corners.views);
-    fit_stage_axes(poses, |pose| {
+    let boards: Vec<_> = poses.iter().map(|p| (p.pose, p.rig_from_board)).collect();
+    fit_stage_axes(&boards, |pose| {
         stage::entry(parts.dataset, &all_poses, pose).placement
     })
 }

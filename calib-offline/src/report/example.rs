@@ -77,6 +77,7 @@ pub fn calibration() -> Calibration {
             camera(camera_idx, name, *rig_from_camera, &corners)
         })
         .collect();
+    let boards: Vec<_> = poses.iter().map(|p| (p.pose, p.rig_from_board)).collect();
     Calibration {
         schema: SCHEMA.to_owned(),
         tool_version: "0.1.0".to_owned(),
@@ -92,7 +93,7 @@ pub fn calibration() -> Calibration {
             datum_pose: 8,
         },
         estimate: estimate(&corners),
-        stage_axes: crate::evaluate::fit_stage_axes(&poses, |pose| Some(pose / 17)),
+        stage_axes: crate::evaluate::fit_stage_axes(&boards, |pose| Some(pose / 17)),
         poses,
         corners,
         left_out: left_out(),

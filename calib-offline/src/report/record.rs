@@ -6,11 +6,12 @@ pub use crate::board::BoardShape;
 use crate::board::BoardSpec;
 pub use crate::evaluate::CrossChecks;
 pub use crate::evaluate::held_out::FailedFold;
+pub use crate::evaluate::stage_axis::StageAxis;
 pub use crate::evaluate::verdict::{Grade, Verdict};
 use crate::field::Rig;
 use crate::geometry::{PixelPoint, RigidTransform};
 use crate::joint::{Choice, SmoothnessFound};
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
 /// Name and version of the format.
@@ -79,21 +80,6 @@ pub struct PoseRecord {
     pub rms_px: Vec<Option<f64>>,
     /// Dial reading, if the dataset has one.
     pub stage_angle_deg: Option<f64>,
-}
-
-/// The axis that the boards of one placement turned about, rig frame.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct StageAxis {
-    /// Number of the placement.
-    pub placement: usize,
-    /// Poses that it was found from.
-    pub poses: usize,
-    /// The point of the axis nearest to the boards' middle, mm.
-    pub point_mm: Vector3<f64>,
-    /// Unit vector along it.
-    pub direction: Vector3<f64>,
-    /// RMS over pairs of poses of the part of their turn that is not about the axis, rad.
-    pub wobble_rms_rad: f64,
 }
 
 /// One corner offered to the estimate.

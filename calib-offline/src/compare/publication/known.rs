@@ -4,9 +4,9 @@ use super::methods::{Method, MethodRun};
 use super::target::{measure_all, middle};
 use crate::dataset::Dataset;
 use crate::error::Error;
-use crate::evaluate::known_points::{PointWithTruth, TruePoint, TruthErrors, compare_with_truth};
+use crate::evaluate::known_points::{TruthErrors, beside_truth, compare_with_truth};
 use crate::geometry::{PixelPoint, best_placement, rms};
-use crate::matches::read_known;
+use crate::matches::{TruePoint, read_known};
 use crate::pipeline::camera_names;
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -94,10 +94,7 @@ fn experiment(
     let mut methods = Vec::new();
     for (method, calibrated, points) in &measured.methods {
         // A method that does not decide which points are common may lack some of them.
-        let paired: Vec<PointWithTruth> = common
-            .iter()
-            .filter_map(|k| Some(truth[*k].with(points[*k]?)))
-            .collect();
+        let paired = beside_truth(points, truth, |k| measured.is_common[k]);
         let from: Vec<Vector3<f64>> = paired.iter().map(|p| p.measured_mm).collect();
         let to: Vec<Vector3<f64>> = paired.iter().map(|p| p.true_mm).collect();
         let mut bins_of_method = Vec::new();

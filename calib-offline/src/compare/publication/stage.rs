@@ -4,7 +4,6 @@ use super::methods::{Calibrated, Method, MethodRun, calibrated};
 use crate::dataset::stage::StageEntry;
 use crate::evaluate::fit_stage_axes;
 use crate::geometry::{RigidTransform, rms, so3};
-use crate::report::record::PoseRecord;
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -67,25 +66,16 @@ fn angles(
     calibrated: &Calibrated,
     entry: &dyn Fn(usize) -> StageEntry,
 ) -> Option<MethodAngles> {
-    let poses: Vec<PoseRecord> = calibrated
-        .datum_from_board
-        .iter()
-        .map(|(pose, placed)| PoseRecord {
-            pose: *pose,
-            rig_from_board: *placed,
-            rms_px: Vec::new(),
-            stage_angle_deg: entry(*pose).angle_deg,
-        })
-        .collect();
-    let axes = fit_stage_axes(&poses, |pose| {
+    let poses = &calibrated.datum_from_board;
+    let axes = fit_stage_axes(poses, |pose| {
         entry(pose).angle_deg.and(entry(pose).placement)
     });
     let mut angles = Vec::new();
     for axis in &axes {
         let dialed: Vec<(usize, f64, RigidTransform)> = poses
             .iter()
-            .filter(|pose| entry(pose.pose).placement == Some(axis.placement))
-            .filter_map(|pose| Some((pose.pose, pose.stage_angle_deg?, pose.rig_from_board)))
+            .filter(|(pose, _)| entry(*pose).placement == Some(axis.placement))
+            .filter_map(|(pose, board)| Some((*pose, entry(*pose).angle_deg?, *board)))
             .collect();
         for (pose, dial_deg, error_deg) in errors_deg(&dialed, &axis.direction) {
             angles.push(StageAngle {
