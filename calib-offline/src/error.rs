@@ -1,22 +1,19 @@
-//! What can go wrong, one variant per stage, each wrapping that stage's own error.
+//! What can go wrong, each kind with the error of its own room: the only one that knows all of them.
 
-use crate::alternating::AlternatingError;
 use crate::atomic_file::WriteError;
 use crate::cli::usage_error::UsageError;
+use crate::compare::CompareError;
 use crate::compare::publication::ExperimentError;
 use crate::dataset::{CornersError, ManifestError, SufficiencyError};
 use crate::demo::DemoError;
 use crate::detect::DetectError;
 use crate::detect::overlay::OverlayError;
 use crate::detect::ring_target::TargetError;
-use crate::detect::suspicion::LabelSuspicion;
 use crate::device::DeviceError;
 use crate::export::ExportError;
-use crate::init::InitError;
-use crate::joint::EstimateError;
 use crate::matches::MatchesError;
 use crate::pack::{BlobError, PackError};
-use crate::pinhole::PinholeError;
+use crate::pipeline::CalibrateError;
 use crate::remedy::Remedy;
 use crate::report::store::CalibrationError;
 use crate::simulate::SimulateError;
@@ -29,12 +26,9 @@ pub enum Error {
     /// The manifest of a dataset.
     #[error("the dataset cannot be used")]
     Manifest(#[from] ManifestError),
-    /// The corners of a dataset.
-    #[error("the corners of the dataset cannot be used")]
-    Corners(#[from] CornersError),
-    /// The search for corners in the images.
-    #[error("the corners cannot be found")]
-    Detect(#[from] DetectError),
+    /// A dataset that gives no calibration, or no corners.
+    #[error(transparent)]
+    Calibrate(CalibrateError),
     /// Pictures of the corners found.
     #[error("the overlays cannot be written")]
     Overlay(#[from] OverlayError),
@@ -44,41 +38,6 @@ pub enum Error {
     /// A dataset that was to be simulated.
     #[error("the dataset cannot be simulated")]
     Simulate(#[from] SimulateError),
-    /// Corners that no estimate could work with.
-    #[error("these corners cannot determine a calibration")]
-    Sufficiency(#[from] SufficiencyError),
-    /// Images that show too little of the board.
-    #[error("{refused} of {total} images were refused; the first: {first}")]
-    FewImages {
-        /// Images that were refused.
-        refused: usize,
-        /// Images looked at.
-        total: usize,
-        /// The file and the reason of the first one refused.
-        first: String,
-        /// What is missing.
-        source: SufficiencyError,
-    },
-    /// Labels that contradict each other, found after no estimate was possible.
-    #[error("the corners do not belong together as they are labelled: {suspicion}")]
-    Labels {
-        /// What is suspected.
-        suspicion: LabelSuspicion,
-        /// The failure that it explains.
-        source: Box<Error>,
-    },
-    /// No starting point.
-    #[error("no camera model explains these corners")]
-    Init(#[from] InitError),
-    /// No estimate.
-    #[error("the estimate failed")]
-    Estimate(#[from] EstimateError),
-    /// No baseline.
-    #[error("the pinhole baseline failed")]
-    Pinhole(#[from] PinholeError),
-    /// No estimate by the published procedure.
-    #[error("the published procedure failed")]
-    Alternating(#[from] AlternatingError),
     /// A calibration that was read.
     #[error("the calibration cannot be used")]
     Calibration(#[from] CalibrationError),
@@ -105,10 +64,10 @@ pub enum Error {
     Write(#[from] WriteError),
     /// A demo that could not measure.
     #[error("the demo cannot measure")]
-    Demo(#[from] DemoError),
+    Demo(#[source] DemoError),
     /// Experiments that came to nothing.
     #[error("the methods cannot be evaluated")]
-    Experiment(#[from] ExperimentError),
+    Experiment(#[source] ExperimentError),
     /// A request that cannot be met.
     #[error("the command cannot be run so")]
     Usage(#[from] UsageError),
@@ -121,82 +80,105 @@ impl From<Infallible> for Error {
     }
 }
 
+/// A pose to leave out that there is not is a request that cannot be met.
+impl From<CalibrateError> for Error {
+    fn from(error: CalibrateError) -> Self {
+        match error {
+            CalibrateError::Exclude(error) => Self::Usage(error.into()),
+            other => Self::Calibrate(other),
+        }
+    }
+}
+
+impl From<CornersError> for Error {
+    fn from(error: CornersError) -> Self {
+        Self::Calibrate(error.into())
+    }
+}
+
+impl From<DetectError> for Error {
+    fn from(error: DetectError) -> Self {
+        Self::Calibrate(error.into())
+    }
+}
+
+impl From<SufficiencyError> for Error {
+    fn from(error: SufficiencyError) -> Self {
+        Self::Calibrate(error.into())
+    }
+}
+
+/// What a comparison gives is told as what it is.
+impl From<CompareError> for Error {
+    fn from(error: CompareError) -> Self {
+        match error {
+            CompareError::Calibrate(error) => error.into(),
+            CompareError::Matches(error) => error.into(),
+        }
+    }
+}
+
+impl From<ExperimentError> for Error {
+    fn from(error: ExperimentError) -> Self {
+        match error {
+            ExperimentError::Manifest(error) => error.into(),
+            ExperimentError::Calibrate(error) => error.into(),
+            ExperimentError::Matches(error) => error.into(),
+            ExperimentError::Target(error) => error.into(),
+            ExperimentError::Simulate(error) => error.into(),
+            error @ ExperimentError::Truth { .. } => Self::Experiment(error),
+        }
+    }
+}
+
+impl From<DemoError> for Error {
+    fn from(error: DemoError) -> Self {
+        match error {
+            DemoError::Pack(error) => error.into(),
+            error => Self::Demo(error),
+        }
+    }
+}
+
 /// The exit code where the data cannot determine the answer.
-pub const DATA_UNDETERMINED: u8 = 3;
+const DATA_UNDETERMINED: u8 = 3;
 
 impl Error {
-    /// The process's exit code: [`DATA_UNDETERMINED`], else 2.
+    /// The process's exit code: 3 where the data cannot determine the answer, else 2.
     pub fn exit_code(&self) -> u8 {
-        match self {
-            Self::Sufficiency(_)
-            | Self::FewImages { .. }
-            | Self::Labels { .. }
-            | Self::Detect(DetectError::Consistency(_))
-            | Self::Target(TargetError::AllRefused { .. })
-            | Self::Init(_)
-            | Self::Estimate(_)
-            | Self::Pinhole(_)
-            | Self::Alternating(_)
-            | Self::Pack(PackError::NothingCalibrated { .. }) => DATA_UNDETERMINED,
-            Self::Manifest(_)
-            | Self::Corners(_)
-            | Self::Detect(_)
-            | Self::Overlay(_)
-            | Self::Target(_)
-            | Self::Simulate(_)
-            | Self::Calibration(_)
-            | Self::Blob(_)
-            | Self::Matches(_)
-            | Self::Pack(_)
-            | Self::Export(_)
-            | Self::Device(_)
-            | Self::Demo(_)
-            | Self::Experiment(_)
-            | Self::Json(_)
-            | Self::Write(_)
-            | Self::Usage(_) => 2,
+        let is_undetermined = match self {
+            Self::Calibrate(error) => error.is_undetermined(),
+            Self::Target(error) => matches!(error, TargetError::AllRefused { .. }),
+            Self::Pack(error) => matches!(error, PackError::NothingCalibrated { .. }),
+            _ => false,
+        };
+        if is_undetermined {
+            DATA_UNDETERMINED
+        } else {
+            2
         }
     }
 }
 
 impl Remedy for Error {
     fn remedy(&self) -> Option<String> {
-        let text = match self {
-            Self::Manifest(error) => return error.remedy(),
-            Self::Corners(error) => return error.remedy(),
-            Self::Detect(error) => return error.remedy(),
-            Self::Overlay(error) => return error.remedy(),
-            Self::Target(error) => return error.remedy(),
-            Self::Simulate(error) => return error.remedy(),
-            Self::Sufficiency(error) => return error.remedy(),
-            Self::Labels { suspicion, .. } => return suspicion.remedy(),
-            Self::Calibration(error) => return error.remedy(),
-            Self::Blob(error) => return error.remedy(),
-            Self::Matches(error) => return error.remedy(),
-            Self::Pack(error) => return error.remedy(),
-            Self::Export(error) => return error.remedy(),
-            Self::Device(error) => return error.remedy(),
-            Self::Experiment(error) => return error.remedy(),
-            Self::Write(error) => return error.remedy(),
-            Self::Usage(error) => return error.remedy(),
-            Self::Json(_) | Self::Demo(_) => return None,
-            Self::FewImages { .. } => {
-                "correct dataset.toml or the images as the reason says; calib-offline detect DATASET \
-                 --overlay DIR gives the reason for every image"
-            }
-            Self::Init(_) | Self::Estimate(_) => {
-                "look at the corners with calib-offline inspect, and at the images with detect \
-                 --overlay; check rows, cols and the image size in dataset.toml, and record the \
-                 board at more tilts and distances"
-            }
-            Self::Pinhole(_) => {
-                "leave the baseline out: calib-offline calibrate makes no assumption about the lens"
-            }
-            Self::Alternating(_) => {
-                "leave --method out: the joint estimate takes all views together; or add boards at \
-                 other distances"
-            }
-        };
-        Some(text.to_owned())
+        match self {
+            Self::Manifest(error) => error.remedy(),
+            Self::Calibrate(error) => error.remedy(),
+            Self::Overlay(error) => error.remedy(),
+            Self::Target(error) => error.remedy(),
+            Self::Simulate(error) => error.remedy(),
+            Self::Calibration(error) => error.remedy(),
+            Self::Blob(error) => error.remedy(),
+            Self::Matches(error) => error.remedy(),
+            Self::Pack(error) => error.remedy(),
+            Self::Export(error) => error.remedy(),
+            Self::Device(error) => error.remedy(),
+            Self::Write(error) => error.remedy(),
+            Self::Demo(error) => error.remedy(),
+            Self::Experiment(error) => error.remedy(),
+            Self::Usage(error) => error.remedy(),
+            Self::Json(_) => None,
+        }
     }
 }

@@ -4,55 +4,36 @@
 //! that cannot be what they claim; the joint estimate adjusts everything and looks at the views
 //! once more; held-out boards and the calibration itself judge it; the record says all of it.
 
+pub mod error;
 mod left_out;
 mod summary;
 
+pub use error::{CalibrateError, NoSuchPose};
+
 use crate::adjust::Observations;
-use crate::alternating::rays::RaySource;
-use crate::cli::usage_error::UsageError;
-use crate::dataset::corners::{load_corners, poses};
+use crate::dataset::corners::load_corners;
 use crate::dataset::split::without_excluded;
+use crate::dataset::stage::placements;
 use crate::dataset::sufficiency::{SufficiencyError, check_sufficiency};
-use crate::dataset::{Dataset, View, stage};
+use crate::dataset::{Dataset, View};
 use crate::detect::suspicion::suspicious_labels;
 use crate::detect::verdict::Outcome;
 use crate::detect::{self, DetectSettings};
-use crate::error::{DATA_UNDETERMINED, Error};
+use crate::evaluate::half_data::first_half;
+use crate::evaluate::held_out::folds_wanted;
 use crate::evaluate::verdict::Thresholds;
 use crate::evaluate::{Folds, held_out};
 use crate::field::RayTable;
-use crate::methods::alternating::alternating_solution;
-use crate::methods::joint::joint_solution;
-use crate::methods::solution::{Solved, Task};
+use crate::methods::{Given, Joint, Method, MethodError, Own, fit_folds};
 use crate::progress::Progress;
 use crate::report::Calibration;
-use clap::ValueEnum;
-
-/// Which estimate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Method {
-    /// All cameras and poses together.
-    Joint,
-    /// The published procedure.
-    Alternating,
-}
-
-impl Method {
-    /// The name in files and on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Joint => "joint",
-            Self::Alternating => "alternating",
-        }
-    }
-}
 
 /// How to calibrate. Nothing here needs to be chosen by the user. Poses are left out by the
 /// dataset's own list.
 #[derive(Debug, Clone)]
 pub struct CalibrateSettings {
-    /// Which estimate.
-    pub method: Method,
+    /// Which method.
+    pub method: &'static dyn Method,
     /// Folds of the held-out check; 0 leaves it out, and the comparison of two halves with it.
     pub folds: usize,
     /// What counts as good.
@@ -66,7 +47,7 @@ pub struct CalibrateSettings {
 impl Default for CalibrateSettings {
     fn default() -> Self {
         Self {
-            method: Method::Joint,
+            method: &Joint,
             folds: 5,
             thresholds: Thresholds::default(),
             detect: DetectSettings::default(),
@@ -92,7 +73,7 @@ pub fn corners(
     dataset: &Dataset,
     settings: &DetectSettings,
     progress: &dyn Progress,
-) -> Result<Corners, Error> {
+) -> Result<Corners, CalibrateError> {
     if let Some(views) = load_corners(dataset)? {
         return Ok(Corners {
             views,
@@ -115,8 +96,8 @@ pub struct Checked {
     pub offered: Observations,
     /// The estimates of the held-out check, for whoever wants to measure with them.
     pub folds: Folds,
-    /// One ray per pixel as the method has them; `None` where it has fields.
-    pub ray_sources: Option<Vec<RaySource>>,
+    /// What the method has beside the calibration.
+    pub own: Box<dyn Own>,
 }
 
 /// A calibration, and what else was asked for.
@@ -149,7 +130,7 @@ pub fn calibrate(
     dataset: &Dataset,
     settings: &CalibrateSettings,
     progress: &dyn Progress,
-) -> Result<Calibrated, Error> {
+) -> Result<Calibrated, CalibrateError> {
     let corners = corners(dataset, &settings.detect, progress)?;
     let checked = calibrate_corners(dataset, &corners, settings, progress)?;
     let mut calibrated = Calibrated::from(checked.calibration);
@@ -160,11 +141,8 @@ pub fn calibrate(
             .iter()
             .enumerate()
             .map(|(camera_idx, camera)| {
-                let sources = checked.ray_sources.as_ref();
-                let table = match sources.and_then(|sources| sources.get(camera_idx)) {
-                    Some(source) => source.table(camera.field.sensor),
-                    None => RayTable::of_camera(camera),
-                };
+                let own = checked.own.ray_table(camera_idx, camera.field.sensor);
+                let table = own.unwrap_or_else(|| RayTable::of_camera(camera));
                 progress.advance();
                 table
             })
@@ -183,36 +161,48 @@ pub fn calibrate_corners(
     corners: &Corners,
     settings: &CalibrateSettings,
     progress: &dyn Progress,
-) -> Result<Checked, Error> {
+) -> Result<Checked, CalibrateError> {
     let Offered {
         views,
         observations,
     } = offered(dataset, corners)?;
-    let names = camera_names(dataset);
-    let all_poses = poses(&corners.views);
-    let task = Task {
-        names: &names,
-        folds: settings.folds,
-        placement: &|pose| stage::entry(dataset, &all_poses, pose).placement,
+    let given = Given {
+        observations: &observations,
+        names: &camera_names(dataset),
+        placements: &placements(dataset, &corners.views),
+        joint: None,
     };
-    let found = match settings.method {
-        Method::Joint => joint_solution(&observations, &task, progress),
-        Method::Alternating => alternating_solution(&observations, &task, progress),
-    };
-    let Solved { solution, folds } = found.map_err(|error| explained(error, dataset, &views))?;
+    let solution = settings
+        .method
+        .fit(&given, progress)
+        .map_err(|error| explained(error, dataset, &views))?;
+
+    let used = &solution.observations;
+    let folds = folds_wanted(used, settings.folds);
+    let half = first_half(used.poses.iter().copied(), |pose| {
+        given.placements.get(&pose).copied()
+    });
+    let half = (settings.folds > 0).then_some(&half);
+    progress.begin("cross-checks", folds);
+    let (folds, checks) = rayon::join(
+        || fit_folds(settings.method, &given, used, folds, progress),
+        || solution.own.check(&solution.rig, half),
+    );
+    progress.end();
     let calibration = summary::record(&summary::Parts {
         dataset,
         corners,
         observations: &observations,
         solution: &solution,
         held_out: &held_out(&folds),
+        checks: checks.as_ref(),
         thresholds: &settings.thresholds,
     });
     Ok(Checked {
         calibration,
-        offered: observations,
         folds,
-        ray_sources: solution.ray_sources,
+        own: solution.own,
+        offered: observations,
     })
 }
 
@@ -229,7 +219,7 @@ pub struct Offered {
 ///
 /// # Errors
 /// A pose to leave out that is none; too few corners.
-pub fn offered(dataset: &Dataset, corners: &Corners) -> Result<Offered, Error> {
+pub fn offered(dataset: &Dataset, corners: &Corners) -> Result<Offered, CalibrateError> {
     check_excluded(dataset, &corners.views)?;
     let views = without_excluded(corners.views.clone(), &dataset.excluded_poses).used;
     check_sufficiency(dataset, &views)
@@ -241,18 +231,14 @@ pub fn offered(dataset: &Dataset, corners: &Corners) -> Result<Offered, Error> {
     })
 }
 
-/// An error, with labels that contradict each other if they explain it: they are looked for only where
-/// the data determined no answer.
-pub fn explained(error: Error, dataset: &Dataset, used: &[View]) -> Error {
-    if error.exit_code() != DATA_UNDETERMINED {
-        return error;
-    }
+/// Why no method had an answer: labels that contradict each other, if they explain it.
+pub fn explained(error: MethodError, dataset: &Dataset, used: &[View]) -> CalibrateError {
     match suspicious_labels(dataset, used) {
-        Some(suspicion) => Error::Labels {
+        Some(suspicion) => CalibrateError::Labels {
             suspicion,
-            source: Box::new(error),
+            source: error,
         },
-        None => error,
+        None => error.into(),
     }
 }
 
@@ -262,12 +248,12 @@ pub fn camera_names(dataset: &Dataset) -> Vec<String> {
 }
 
 /// Every pose that is left out must be one: a slip in a number would leave the bad pose in.
-fn check_excluded(dataset: &Dataset, views: &[View]) -> Result<(), UsageError> {
+fn check_excluded(dataset: &Dataset, views: &[View]) -> Result<(), NoSuchPose> {
     let last_seen = views.iter().map(|view| view.pose).max();
     let last_image = dataset.image_pose_count().checked_sub(1);
     let last = last_seen.max(last_image).unwrap_or(0);
     match dataset.excluded_poses.iter().find(|pose| **pose > last) {
-        Some(&pose) => Err(UsageError::NoSuchPose { pose, last }),
+        Some(&pose) => Err(NoSuchPose { pose, last }),
         None => Ok(()),
     }
 }
@@ -277,18 +263,18 @@ fn with_refusals(
     dataset: &Dataset,
     source: SufficiencyError,
     detection: Option<&detect::Detection>,
-) -> Error {
+) -> CalibrateError {
     let images = detection.map_or(&[][..], |detection| &detection.images);
     let mut refused = images.iter().filter_map(|image| match &image.outcome {
         Outcome::Refused(reason) => Some((image, reason)),
         Outcome::Used { .. } => None,
     });
     let Some((image, reason)) = refused.next() else {
-        return Error::Sufficiency(source);
+        return source.into();
     };
     let path = image.path.strip_prefix(&dataset.folder);
     let path = path.unwrap_or(&image.path);
-    Error::FewImages {
+    CalibrateError::FewImages {
         first: format!("{}: {reason}", path.display()),
         refused: 1 + refused.count(),
         total: images.len(),

@@ -15,8 +15,7 @@ use calib_offline::alternating::{
 use calib_offline::evaluate::known_points::TruthErrors;
 use calib_offline::geometry::RigidTransform;
 use calib_offline::init::rig::start_rig;
-use calib_offline::methods::alternating::alternating_solution;
-use calib_offline::methods::solution::Task;
+use calib_offline::methods::{Alternating, Given, Method as _};
 use calib_offline::progress::Silent;
 use calib_offline::simulate::{MatchSet, OpticsKind, Scene};
 
@@ -194,15 +193,14 @@ fn a_start_that_does_not_exist_is_not_blamed_on_the_boards() {
 fn corners_outside_the_calibrated_area_are_no_outliers() {
     // With little noise, what a field says beyond its rays lies far beyond the noise.
     let scene = scene(OpticsKind::Brown, |settings| settings.noise_px = 0.002);
-    let task = Task {
-        names: &["left".to_owned(), "right".to_owned()],
-        folds: 0,
-        placement: &|pose| Some(scene.pose_placements[pose]),
-    };
     let offered = observations(&scene, &scene.observe_corners());
-    let found = alternating_solution(&offered, &task, &Silent)
-        .unwrap()
-        .solution;
+    let given = Given {
+        observations: &offered,
+        names: &["left".to_owned(), "right".to_owned()],
+        placements: &scene.pose_placements.iter().copied().enumerate().collect(),
+        joint: None,
+    };
+    let found = Alternating.fit(&given, &Silent).unwrap();
     let mut outside = 0;
     for (view, residuals) in found.observations.views.iter().zip(&found.residuals) {
         let coverage = &found.rig.cameras[view.camera_idx].coverage;

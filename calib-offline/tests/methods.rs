@@ -2,16 +2,19 @@
 
 mod common;
 
+use calib_offline::adjust::Observations;
 use calib_offline::compare::{compare_methods, words};
 use calib_offline::dataset::Dataset;
 use calib_offline::detect::DetectSettings;
-use calib_offline::methods::{CONTENDERS, Contender, Failure};
+use calib_offline::evaluate::held_out::Estimated;
+use calib_offline::methods::{Given, Joint, Method, MethodError, Pinhole, Solution};
 use calib_offline::pipeline;
-use calib_offline::progress::Silent;
+use calib_offline::progress::{Progress, Silent};
 use common::{MANIFEST, contents, corners_csv, dataset, run};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A small recording: 14 poses of 42 corners before two cameras.
 fn simulate(folder: &Path, optics: &str) {
@@ -195,29 +198,61 @@ fn outliers_hide_no_difference() {
     assert!(number(&rigid["high"]) < 0.95, "{rigid}");
 }
 
-/// A method that never has an answer, and one that has none for any fold.
+/// A method that never has an answer.
+#[derive(Debug)]
+struct Never;
+
+/// The baseline, if it never had an answer for some of the poses.
+#[derive(Debug)]
+struct NoFolds;
+
+fn failed(why: &str) -> MethodError {
+    MethodError::Other(Arc::new(std::io::Error::other(why)))
+}
+
+impl Method for Never {
+    fn name(&self) -> &'static str {
+        "never"
+    }
+
+    fn title(&self) -> &'static str {
+        "never"
+    }
+
+    fn fit(&self, _: &Given, _: &dyn Progress) -> Result<Solution, MethodError> {
+        Err(failed("there is none"))
+    }
+
+    fn fit_some_poses(&self, _: &Observations, _: &Given) -> Result<Estimated, MethodError> {
+        panic!("nobody asks for folds of a method without an answer")
+    }
+}
+
+impl Method for NoFolds {
+    fn name(&self) -> &'static str {
+        "no-folds"
+    }
+
+    fn title(&self) -> &'static str {
+        "no folds"
+    }
+
+    fn fit(&self, given: &Given, progress: &dyn Progress) -> Result<Solution, MethodError> {
+        Pinhole.fit(given, progress)
+    }
+
+    fn fit_some_poses(&self, _: &Observations, _: &Given) -> Result<Estimated, MethodError> {
+        Err(failed("too few"))
+    }
+}
+
 #[test]
 fn a_method_that_fails_leaves_the_others_standing() {
     let folder = tempfile::tempdir().unwrap();
     simulate(folder.path(), "brown");
     let dataset = Dataset::load(&folder.path().join("set")).unwrap();
     let corners = pipeline::corners(&dataset, &DetectSettings::default(), &Silent).unwrap();
-    let [baseline, _, joint] = &CONTENDERS;
-    let methods = [
-        Contender {
-            name: "never",
-            title: "never",
-            fit: |_, _| Err(Failure("there is none".to_owned())),
-            fold: baseline.fold,
-        },
-        Contender {
-            name: "no-folds",
-            title: "no folds",
-            fit: baseline.fit,
-            fold: |_, _| Err(Failure("too few".to_owned())),
-        },
-        *joint,
-    ];
+    let methods: [&dyn Method; 3] = [&Never, &NoFolds, &Joint];
     let found = compare_methods(&methods, &dataset, &corners, 4, &Silent).unwrap();
     let [never, no_folds, joint] = &found.methods[..] else {
         panic!("{}", found.methods.len());

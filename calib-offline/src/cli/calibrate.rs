@@ -6,13 +6,14 @@ use super::place::check_results_folder;
 use crate::atomic_file::{make_folder, write_set};
 use crate::dataset::Dataset;
 use crate::error::Error;
+use crate::methods::{self, Method};
 use crate::pack::{PackSettings, pack_nearest};
-use crate::pipeline::{CalibrateSettings, Calibrated, Method};
+use crate::pipeline::{CalibrateError, CalibrateSettings, Calibrated};
 use crate::progress::Progress;
 use crate::report::facts::Facts;
 use crate::report::record::Grade;
 use crate::report::{BlobFacts, Calibration, html, text};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -57,7 +58,7 @@ pub struct CalibrateArgs {
     pub output: PathBuf,
     /// How to estimate
     #[arg(long, default_value = "joint")]
-    pub method: Method,
+    pub method: MethodArg,
     /// Leave these poses out, besides those that the manifest leaves out
     #[arg(long, value_name = "POSE", value_delimiter = ',')]
     pub exclude: Vec<usize>,
@@ -72,9 +73,27 @@ pub struct CalibrateArgs {
     pub force: bool,
 }
 
+/// Which estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MethodArg {
+    /// All cameras and poses together.
+    Joint,
+    /// The published procedure.
+    Alternating,
+}
+
+impl MethodArg {
+    const fn method(self) -> &'static dyn Method {
+        match self {
+            Self::Joint => &methods::Joint,
+            Self::Alternating => &methods::Alternating,
+        }
+    }
+}
+
 /// What estimates: `pipeline::calibrate`, or a stand-in in tests.
 pub type Estimate<'a> =
-    &'a dyn Fn(&Dataset, &CalibrateSettings, &dyn Progress) -> Result<Calibrated, Error>;
+    &'a dyn Fn(&Dataset, &CalibrateSettings, &dyn Progress) -> Result<Calibrated, CalibrateError>;
 
 /// A calibration and where its files are.
 #[derive(Debug)]
@@ -121,7 +140,7 @@ pub fn run(
     }
     dataset.excluded_poses.extend(&args.exclude);
     let settings = CalibrateSettings {
-        method: args.method,
+        method: args.method.method(),
         ray_tables: args.ray_tables,
         ..CalibrateSettings::default()
     };

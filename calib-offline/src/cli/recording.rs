@@ -25,12 +25,12 @@ pub(super) fn detect(args: &DetectArgs, console: &Console) -> Result<Outcome, Er
     let path = dataset.corners_path();
     check_output(args, &path)?;
     let report = run_detect(args, &dataset, console.progress()).map_err(|error| match error {
-        DetectCommandError::Detect(error) => Error::Detect(error),
-        DetectCommandError::Overlay(error) => Error::Overlay(error),
+        DetectCommandError::Detect(error) => Error::from(error),
+        DetectCommandError::Overlay(error) => error.into(),
     })?;
     if report.views.is_empty() {
         console.narrate(&report.object.in_words());
-        return Err(Error::Sufficiency(SufficiencyError::NoCorners));
+        return Err(SufficiencyError::NoCorners.into());
     }
     write_corners(&path, &dataset, &report.views)?;
     let words = format!(

@@ -1,5 +1,6 @@
 //! Requests that cannot be met.
 
+use crate::pipeline::NoSuchPose;
 use crate::remedy::Remedy;
 use std::path::PathBuf;
 
@@ -41,14 +42,9 @@ pub enum UsageError {
         /// The rig.
         path: PathBuf,
     },
-    /// A pose that the recording does not have.
-    #[error("there is no pose {pose} to leave out; the last is pose {last}")]
-    NoSuchPose {
-        /// The pose asked for.
-        pose: usize,
-        /// The last pose.
-        last: usize,
-    },
+    /// A pose to leave out that the recording does not have.
+    #[error(transparent)]
+    NoSuchPose(#[from] NoSuchPose),
     /// A device's verb without its address.
     #[error("which device is meant? --device is missing")]
     NoDevice,
@@ -77,7 +73,7 @@ impl Remedy for UsageError {
             Self::OneCamera { .. } => {
                 "calibrate two cameras together; a single one gives rays only"
             }
-            Self::NoSuchPose { .. } => "poses count from 0; see calib-offline inspect DATASET",
+            Self::NoSuchPose(error) => return error.remedy(),
             Self::NoDevice => "give its address, such as --device tcp:127.0.0.1:7777",
             Self::NotPacked { .. } => {
                 "pack it first: calib-offline pack calibration.json -o rig.rays"

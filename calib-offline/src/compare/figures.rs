@@ -1,5 +1,6 @@
 //! The figures of each method from its rigs: each over what all methods have.
 
+use super::answer::Answer;
 use super::boards::{BoardScore, FoldScores, score_fold};
 use super::record::{HeldOutFigures, MethodFigures, Ratios, Training, TruthFigures};
 use super::{Run, bootstrap};
@@ -11,13 +12,12 @@ use crate::evaluate::reprojection::residuals;
 use crate::geometry::{RigidTransform, rms};
 use crate::matches::KnownMatches;
 use crate::matches::source::RigSource;
-use crate::methods::Fitted;
 
 /// Median distance of the boards' middles from the first camera, mm.
-pub(super) fn working_distance_mm(fitted: &Fitted, observations: &Observations) -> Option<f64> {
-    let camera = fitted.rig.cameras.first()?;
+pub(super) fn working_distance_mm(answer: &Answer, observations: &Observations) -> Option<f64> {
+    let camera = answer.rig.cameras.first()?;
     let middle = observations.board.center_in_board();
-    let mut distances: Vec<f64> = fitted
+    let mut distances: Vec<f64> = answer
         .rig_from_board
         .iter()
         .flatten()
@@ -35,8 +35,8 @@ pub(super) fn add_training(
 ) {
     let standing = runs
         .iter()
-        .filter_map(|run| run.fitted.as_ref().ok())
-        .map(|fitted| used_residuals_px(fitted, observations));
+        .filter_map(|run| run.answer.as_ref().ok())
+        .map(|answer| used_residuals_px(answer, observations));
     let lengths: Vec<Vec<Option<f64>>> = standing.collect();
     let is_common = |k: usize| {
         lengths
@@ -45,7 +45,7 @@ pub(super) fn add_training(
     };
     let mut of_standing = lengths.iter();
     for (figures, run) in methods.iter_mut().zip(runs) {
-        if run.fitted.is_err() {
+        if run.answer.is_err() {
             continue;
         }
         let Some(own) = of_standing.next() else {
@@ -67,16 +67,16 @@ pub(super) fn add_training(
 
 /// Per corner, in the order of the observations: the length of its residual vector, px; `None` if
 /// the method does not use it.
-fn used_residuals_px(fitted: &Fitted, observations: &Observations) -> Vec<Option<f64>> {
-    let poses: Vec<RigidTransform> = fitted
+fn used_residuals_px(answer: &Answer, observations: &Observations) -> Vec<Option<f64>> {
+    let poses: Vec<RigidTransform> = answer
         .rig_from_board
         .iter()
         .map(|pose| pose.unwrap_or_else(RigidTransform::identity))
         .collect();
-    let found = residuals(&fitted.rig, &poses, &fitted.board_shape, observations);
+    let found = residuals(&answer.rig, &poses, &answer.board_shape, observations);
     let mut lengths = Vec::with_capacity(observations.corner_count());
-    for ((view, residuals), is_used) in observations.views.iter().zip(found).zip(&fitted.is_used) {
-        let is_placed = fitted.rig_from_board[view.pose_idx].is_some();
+    for ((view, residuals), is_used) in observations.views.iter().zip(found).zip(&answer.is_used) {
+        let is_placed = answer.rig_from_board[view.pose_idx].is_some();
         for (residual, is_used) in residuals.iter().zip(is_used) {
             let residual = residual.filter(|_| *is_used && is_placed);
             lengths.push(residual.map(|residual| residual.norm()));
@@ -91,7 +91,7 @@ fn used_residuals_px(fitted: &Fitted, observations: &Observations) -> Vec<Option
 pub(super) fn without_outliers(runs: &[Run], observations: &Observations) -> Observations {
     let is_used: Vec<&Vec<Vec<bool>>> = runs
         .iter()
-        .filter_map(|run| Some(&run.fitted.as_ref().ok()?.is_used))
+        .filter_map(|run| Some(&run.answer.as_ref().ok()?.is_used))
         .collect();
     let mut kept = observations.clone();
     for (view_idx, view) in kept.views.iter_mut().enumerate() {
@@ -204,7 +204,7 @@ pub(super) fn add_truth(methods: &mut [MethodFigures], runs: &[Run], known: &[Kn
     // Without a frame there is always a source.
     let sources: Vec<Option<RigSource>> = runs
         .iter()
-        .map(|run| RigSource::new(&run.fitted.as_ref().ok()?.rig, None))
+        .map(|run| RigSource::new(&run.answer.as_ref().ok()?.rig, None))
         .collect();
     for known in known {
         let points: Vec<Option<Points>> = sources

@@ -1,9 +1,11 @@
 //! Methods side by side on one dataset: the same views, the same folds, and every figure from the
 //! corners that all of them can answer.
 
+mod answer;
 pub mod boards;
 pub mod bootstrap;
 pub mod conclusion;
+pub mod error;
 #[cfg(test)]
 mod example;
 mod figures;
@@ -11,25 +13,25 @@ pub mod publication;
 pub mod record;
 pub mod words;
 
+pub use error::CompareError;
 pub use record::{Comparison, MethodFigures, SCHEMA};
 
-use crate::adjust::Observations;
 use crate::dataset::identity::input_sha256;
 use crate::dataset::{Dataset, stage};
-use crate::error::Error;
-use crate::evaluate::{Folds, estimate_folds};
+use crate::evaluate::Folds;
+use crate::evaluate::held_out::folds_wanted;
 use crate::matches::read_known;
-use crate::methods::solution::folds_wanted;
-use crate::methods::{CONTENDERS, Contender, Failure, Fitted, Shared};
-use crate::pipeline::{Corners, Method, camera_names, explained, offered};
-use crate::progress::Progress;
+use crate::methods::{Given, Joint, METHODS, Method, MethodError, Screened, fit_folds};
+use crate::pipeline::{Corners, camera_names, explained, offered};
+use crate::progress::{Progress, Silent};
+use answer::Answer;
 use figures::{add_held_out, add_training, add_truth, without_outliers, working_distance_mm};
 use std::time::{Duration, Instant};
 
 /// A method and what came of it.
 struct Run<'a> {
-    contender: &'a Contender,
-    fitted: Result<Fitted, Failure>,
+    method: &'a dyn Method,
+    answer: Result<Answer, MethodError>,
     folds: Folds,
     time: Duration,
 }
@@ -40,14 +42,14 @@ struct Run<'a> {
 /// apart.
 ///
 /// # Errors
-/// Unusable input; the joint estimate's own error if no method has an answer.
+/// [`CompareError`]: unusable input; the joint estimate's own error if no method has an answer.
 pub fn compare(
     dataset: &Dataset,
     corners: &Corners,
     folds: usize,
     progress: &dyn Progress,
-) -> Result<Comparison, Error> {
-    compare_methods(&CONTENDERS, dataset, corners, folds, progress)
+) -> Result<Comparison, CompareError> {
+    compare_methods(&METHODS, dataset, corners, folds, progress)
 }
 
 /// [`compare`] for other methods; the first is what the others are measured against.
@@ -55,12 +57,12 @@ pub fn compare(
 /// # Errors
 /// As [`compare`].
 pub fn compare_methods(
-    contenders: &[Contender],
+    methods: &[&dyn Method],
     dataset: &Dataset,
     corners: &Corners,
     folds: usize,
     progress: &dyn Progress,
-) -> Result<Comparison, Error> {
+) -> Result<Comparison, CompareError> {
     let offered = offered(dataset, corners)?;
     let names = camera_names(dataset);
     // One camera measures no points.
@@ -69,45 +71,41 @@ pub fn compare_methods(
     } else {
         read_known(&dataset.folder, &names)?
     };
+    let placements = stage::placements(dataset, &corners.views);
     progress.begin("screening", 0);
     let began = Instant::now();
-    let shared = Shared::of(
-        &offered.observations,
-        stage::placements(dataset, &corners.views),
-    );
+    let screened = Screened::of(&offered.observations);
     let joint_time = began.elapsed();
     progress.end();
-    let observations = &shared.observations;
+    let given = screened.given(&names, &placements);
+    let observations = given.observations;
     let folds = folds_wanted(observations, folds).min(observations.poses.len());
-    let runs: Vec<Run> = contenders
+    let runs: Vec<Run> = methods
         .iter()
-        .map(|contender| {
-            progress.begin(contender.title, folds);
-            let run = run(contender, &shared, &names, folds, progress);
+        .map(|method| {
+            progress.begin(method.title(), folds);
+            let run = run(*method, &given, folds, progress);
             progress.end();
             run
         })
         .collect();
-    if runs.iter().all(|run| run.fitted.is_err())
-        && let Err(error) = shared.joint
+    if runs.iter().all(|run| run.answer.is_err())
+        && let Err(error) = &screened.joint
     {
-        return Err(explained(error, dataset, &offered.views));
+        return Err(explained(error.clone(), dataset, &offered.views).into());
     }
-    let mut methods: Vec<MethodFigures> = runs.iter().map(empty_row).collect();
-    for (run, figures) in runs.iter().zip(&mut methods) {
+    let mut rows: Vec<MethodFigures> = runs.iter().map(empty_row).collect();
+    for row in &mut rows {
         // The screening is the joint estimate's own.
-        let own_share = run.contender.name == Method::Joint.name();
-        figures.time += if own_share {
-            joint_time
-        } else {
-            Duration::ZERO
-        };
+        if row.method == Joint.name() {
+            row.time += joint_time;
+        }
     }
-    add_training(&mut methods, &runs, observations);
+    add_training(&mut rows, &runs, observations);
     let judged = without_outliers(&runs, observations);
-    let held_out = add_held_out(&mut methods, &runs, folds, &judged);
-    add_truth(&mut methods, &runs, &known);
-    let best = runs.iter().rev().find_map(|run| run.fitted.as_ref().ok());
+    let held_out = add_held_out(&mut rows, &runs, folds, &judged);
+    add_truth(&mut rows, &runs, &known);
+    let best = runs.iter().rev().find_map(|run| run.answer.as_ref().ok());
     let mut comparison = Comparison {
         schema: SCHEMA,
         tool_version: env!("CARGO_PKG_VERSION"),
@@ -122,7 +120,7 @@ pub fn compare_methods(
         held_out_corners: held_out.iter().map(|fold| fold.corner_count).sum(),
         common_corners: held_out.iter().map(|fold| fold.common_count).sum(),
         boards: held_out.iter().map(|fold| fold.boards.len()).sum(),
-        methods,
+        methods: rows,
         conclusion: Vec::new(),
     };
     comparison.conclusion = conclusion::conclude(&comparison);
@@ -130,33 +128,30 @@ pub fn compare_methods(
 }
 
 fn run<'a>(
-    contender: &'a Contender,
-    shared: &Shared,
-    names: &[String],
+    method: &'a dyn Method,
+    given: &Given,
     folds: usize,
     progress: &dyn Progress,
 ) -> Run<'a> {
     let began = Instant::now();
-    let fitted = (contender.fit)(shared, names);
-    let folds = if fitted.is_ok() { folds } else { 0 };
-    let fold = |training: &Observations| (contender.fold)(shared, training);
-    let folds = estimate_folds(&shared.observations, folds, &fold, progress);
+    let solution = method.fit(given, &Silent);
+    let folds = if solution.is_ok() { folds } else { 0 };
     Run {
-        contender,
-        fitted,
-        folds,
+        method,
+        answer: solution.map(|solution| Answer::new(solution, given.observations)),
+        folds: fit_folds(method, given, given.observations, folds, progress),
         time: began.elapsed(),
     }
 }
 
 fn empty_row(run: &Run) -> MethodFigures {
-    let fitted = run.fitted.as_ref();
+    let answer = run.answer.as_ref();
     MethodFigures {
-        method: run.contender.name,
-        title: run.contender.title,
-        failure: fitted.err().map(ToString::to_string),
+        method: run.method.name(),
+        title: run.method.title(),
+        failure: answer.err().map(MethodError::reason),
         training: None,
-        conversion_error_px: fitted.ok().map(|fitted| fitted.conversion_error_px),
+        conversion_error_px: answer.ok().map(|answer| answer.conversion_error_px),
         failed_folds: run.folds.failed.clone(),
         held_out: None,
         against_first: None,

@@ -8,6 +8,8 @@ pub mod unseen;
 pub mod words;
 
 use crate::evaluate::known_points::KnownPoints;
+use crate::pack::PackError;
+use crate::remedy::Remedy;
 use firmware_sim::client::ClientError;
 use ray_runtime::OpenError;
 use serde::Serialize;
@@ -36,10 +38,22 @@ pub enum DemoError {
     /// The blob just packed does not open.
     #[error("the runtime refuses the blob just packed: {0}")]
     Open(#[from] OpenError),
+    /// The rig of a fold cannot be packed.
+    #[error("the rig of a fold cannot be packed")]
+    Pack(#[from] PackError),
     /// The simulated device cannot listen.
     #[error("the simulated device cannot be started")]
     Start(#[source] std::io::Error),
     /// The simulated device does not answer.
     #[error("the simulated device does not answer")]
     Device(#[from] ClientError),
+}
+
+impl Remedy for DemoError {
+    fn remedy(&self) -> Option<String> {
+        match self {
+            Self::Pack(error) => error.remedy(),
+            Self::Open(_) | Self::Start(_) | Self::Device(_) => None,
+        }
+    }
 }

@@ -2,7 +2,6 @@
 
 use super::DemoError;
 use crate::adjust::Observations;
-use crate::error::Error;
 use crate::evaluate::Folds;
 use crate::evaluate::held_out::{BoardErrors, Fold, measure_boards};
 use crate::geometry::rms;
@@ -67,7 +66,7 @@ pub fn measure_unseen(
     folds: &Folds,
     offered: &Observations,
     settings: &PackSettings,
-) -> Result<Option<UnseenBoards>, Error> {
+) -> Result<Option<UnseenBoards>, DemoError> {
     let measured = in_order::try_map(&folds.estimated, |fold| {
         measure_fold(fold, offered, settings)
     })?;
@@ -96,10 +95,10 @@ fn measure_fold(
     fold: &Fold,
     offered: &Observations,
     settings: &PackSettings,
-) -> Result<FoldErrors, Error> {
+) -> Result<FoldErrors, DemoError> {
     let packed = pack_nearest(&fold.rig, settings)?;
     let bytes = AlignedBytes::from(packed.bytes.as_slice());
-    let blob = RayBlob::open(&bytes).map_err(DemoError::Open)?;
+    let blob = RayBlob::open(&bytes)?;
     let recorded = offered.with_poses(|pose| fold.unseen.poses.contains(&pose));
     // Without a frame there is always a source.
     let source = BlobSource::new(&blob, None);

@@ -10,6 +10,7 @@ use crate::adjust::Observations;
 use crate::adjust::observations::ViewBlock;
 use crate::board::BoardShape;
 use crate::dataset::Corner;
+use crate::dataset::sufficiency::MIN_POSES;
 use crate::field::Rig;
 use crate::geometry::PixelPoint;
 use crate::matches::source::{PointSource, RigSource};
@@ -105,6 +106,15 @@ impl BoardErrors {
 /// Fold of the pose with this index: poses are dealt in turn, so that every fold spans the stage.
 pub fn fold_of(pose_idx: usize, folds: usize) -> usize {
     pose_idx % folds.max(1)
+}
+
+/// So many folds, or none with too few poses to leave some out.
+pub fn folds_wanted(used: &Observations, folds: usize) -> usize {
+    if used.different_pose_count() >= 2 * MIN_POSES {
+        folds
+    } else {
+        0
+    }
 }
 
 /// Estimates each fold from the other folds' poses by any method.

@@ -38,6 +38,16 @@ impl Status {
     }
 }
 
+impl From<MeasureError> for Status {
+    fn from(error: MeasureError) -> Self {
+        match error {
+            MeasureError::Outside { .. } => Self::Outside,
+            MeasureError::Triangulate(TriangulateError::Behind) => Self::Behind,
+            MeasureError::Triangulate(_) => Self::Parallel,
+        }
+    }
+}
+
 /// A triangulated match.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point<N> {
@@ -137,11 +147,7 @@ impl PointSource for RigSource<'_> {
             let sightings: Vec<_> = sightings.iter().copied().map(pixel).collect();
             self.rig.triangulate(&sightings)
         };
-        let found = result.map_err(|error| match error {
-            MeasureError::Outside { .. } => Status::Outside,
-            MeasureError::Triangulate(TriangulateError::Behind) => Status::Behind,
-            MeasureError::Triangulate(_) => Status::Parallel,
-        })?;
+        let found = result?;
         let point_mm = match &self.frame_from_rig {
             None => found.point_mm,
             Some(frame_from_rig) => frame_from_rig.point(&found.point_mm),

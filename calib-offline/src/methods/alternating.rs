@@ -1,112 +1,144 @@
-//! The published procedure as a method of the pipeline.
+//! The published procedure as a method.
 
-use super::solution::{FoldError, Solution, Solved, Task, folds_wanted};
+use super::solution::{placed_part, positive, weighted};
+use super::{Given, Method, MethodError, Own, Solution};
 use crate::adjust::Observations;
-use crate::adjust::robust::{relative_weights, reweight};
 use crate::alternating::alternation::{Alternated, AlternationStop};
 use crate::alternating::field_rig::FieldRig;
 use crate::alternating::{AlternatingError, AlternatingEstimate, AlternatingSettings, estimate};
 use crate::board::BoardShape;
-use crate::error::Error;
-use crate::evaluate::estimate_folds;
 use crate::evaluate::held_out::Estimated;
 use crate::evaluate::reprojection::residuals;
-use crate::field::{BaseLens, Rig};
+use crate::field::{BaseLens, MeasureError, RayTable, Rig};
+use crate::geometry::{PixelPoint, Ray, SensorSize, triangulate_pair, triangulate_rays};
 use crate::init::rig::{RigStart, start_rig};
-use crate::pipeline::Method;
+use crate::matches::source::{Point, PointSource, Sighting, Status};
 use crate::progress::Progress;
 use crate::report::record::AlternatingRecord;
 use nalgebra::Vector2;
+use std::collections::BTreeMap;
 
-/// Screens, runs the published procedure, and checks it without the poses of each fold.
-///
-/// # Errors
-/// Data that cannot determine the answer.
-pub fn alternating_solution(
-    offered: &Observations,
-    task: &Task,
-    progress: &dyn Progress,
-) -> Result<Solved, Error> {
-    progress.begin("initialize", 1);
-    let start = start_rig(offered)?;
-    progress.end();
+/// Rays of single pixels and poses in turn, as published.
+#[derive(Debug, Clone, Copy)]
+pub struct Alternating;
 
-    progress.begin("estimate", 1);
-    let (found, fields) = estimate_rig(&start, task.names, task.placement)?;
-    progress.end();
+impl Method for Alternating {
+    fn name(&self) -> &'static str {
+        "alternating"
+    }
 
-    // Poses that no camera placed take no part.
-    let used = found
-        .observations
-        .with_pose_indices(|pose_idx| found.rig_from_board[pose_idx].is_some());
-    let rig_from_board: Vec<_> = found.rig_from_board.iter().flatten().copied().collect();
-    let board_shape = BoardShape::default();
-    let mut residuals = residuals(&fields.rig, &rig_from_board, &board_shape, &used);
-    drop_outside(&fields.rig, &used, &mut residuals);
-    let (noise, _) = reweight(&residuals, &used, 1.0, None);
-    let robust_weights = relative_weights(&residuals, &used, &noise);
+    fn title(&self) -> &'static str {
+        "rays one by one, alternating"
+    }
 
-    let folds = folds_wanted(&used, task.folds);
-    progress.begin("cross-checks", folds);
-    let estimate_fold = |training: &Observations| estimate_alternating(training, task.placement);
-    let folds = estimate_folds(&used, folds, &estimate_fold, progress);
-    progress.end();
-    let record = record(&found, &fields);
-    Ok(Solved {
-        solution: Solution {
-            method: Method::Alternating,
+    /// Screens and estimates. Corners count where the joint estimate's weights would keep them.
+    fn fit(&self, given: &Given, progress: &dyn Progress) -> Result<Solution, MethodError> {
+        progress.begin("initialize", 1);
+        let start = start_rig(given.observations)?;
+        progress.end();
+
+        progress.begin("estimate", 1);
+        let (found, fields) = estimate_rig(&start, given.names, given.placements)?;
+        progress.end();
+
+        let (used, rig_from_board) = placed_part(&found.observations, &found.rig_from_board);
+        let board_shape = BoardShape::default();
+        let mut residuals = residuals(&fields.rig, &rig_from_board, &board_shape, &used);
+        // The networks learn corners beyond the calibrated area too.
+        let (_, weights) = weighted(&residuals, &used);
+        drop_outside(&fields.rig, &used, &mut residuals);
+        let (noise, robust_weights) = weighted(&residuals, &used);
+        Ok(Solution {
+            method: self.name(),
             findings: start.findings,
+            // Of single rays, which carry noise that the field does not.
+            conversion_error_px: fields.rms_error_px.iter().copied().fold(0.0, f64::max),
+            alternating: Some(record(&found, &fields)),
             rig: fields.rig,
             rig_from_board,
             board_shape,
             observations: used,
             residuals,
+            is_used: positive(&weights),
             robust_weights,
             sigma_px: noise.variance_px2.sqrt(),
+            costs: found.alternated.rms_mm.clone(),
             stop_reason: stop_reason(&found.alternated),
             settled: found.alternated.still_falling().is_none(),
-            costs: found.alternated.rms_mm,
             choices: None,
-            alternating: Some(record),
-            ray_sources: Some(found.cameras),
-            checks: None,
-        },
-        folds,
-    })
-}
+            own: Box::new(SingleRays(found)),
+        })
+    }
 
-/// The published procedure on some training poses. The cameras of its rig are named by number.
-///
-/// # Errors
-/// [`FoldError`].
-pub fn estimate_alternating(
-    training: &Observations,
-    placement: &dyn Fn(usize) -> Option<usize>,
-) -> Result<Estimated, FoldError<AlternatingError>> {
-    let start = start_rig(training)?;
-    let names = training.numbered_cameras();
-    let (_, fields) = estimate_rig(&start, &names, placement).map_err(FoldError::Estimate)?;
-    Ok(Estimated {
-        rig: fields.rig,
-        board_shape: BoardShape::default(),
-    })
+    fn fit_some_poses(
+        &self,
+        training: &Observations,
+        given: &Given,
+    ) -> Result<Estimated, MethodError> {
+        let start = start_rig(training)?;
+        let names = training.numbered_cameras();
+        let (_, fields) = estimate_rig(&start, &names, given.placements)?;
+        Ok(Estimated {
+            rig: fields.rig,
+            board_shape: BoardShape::default(),
+        })
+    }
 }
 
 /// The published procedure from a start, and its cameras as fields.
-///
-/// # Errors
-/// [`AlternatingError`].
-pub fn estimate_rig(
+fn estimate_rig(
     start: &RigStart,
     names: &[String],
-    placement: &dyn Fn(usize) -> Option<usize>,
+    placements: &BTreeMap<usize, usize>,
 ) -> Result<(AlternatingEstimate, FieldRig), AlternatingError> {
-    let found = estimate(start, placement, &AlternatingSettings::default())?;
+    let placement = |pose: usize| placements.get(&pose).copied();
+    let found = estimate(start, &placement, &AlternatingSettings::default())?;
     let bases: Vec<BaseLens> = start.fields.iter().map(|field| field.base).collect();
     let fields = found
         .rig(names, &bases)
         .ok_or(AlternatingError::FewBoards)?;
     Ok((found, fields))
+}
+
+/// Points by the rays of single pixels, before they are smoothed into fields; rig frame.
+#[derive(Debug)]
+pub struct SingleRays(pub AlternatingEstimate);
+
+impl PointSource for SingleRays {
+    type Number = f64;
+
+    fn cameras(&self) -> Vec<String> {
+        self.0.observations.numbered_cameras()
+    }
+
+    fn point(&self, sightings: &[Sighting<f64>]) -> Result<Point<f64>, Status> {
+        let ray = |&(camera_idx, [u, v]): &Sighting<f64>| {
+            let source = self.0.cameras.get(camera_idx)?;
+            Some(source.ray(PixelPoint::new(u, v))?.ray)
+        };
+        let rays: Option<Vec<Ray>> = sightings.iter().map(ray).collect();
+        let rays = rays.ok_or(Status::Outside)?;
+        let found = match &rays[..] {
+            [a, b] => triangulate_pair(a, b),
+            all => triangulate_rays(all),
+        };
+        let found = found.map_err(MeasureError::from)?;
+        Ok(Point {
+            point_mm: found.point_mm.into(),
+            gap_mm: found.gap_mm,
+            sigma_mm: None,
+        })
+    }
+}
+
+impl Own for SingleRays {
+    fn rays(&self) -> Option<&dyn PointSource<Number = f64>> {
+        Some(self)
+    }
+
+    fn ray_table(&self, camera_idx: usize, sensor: SensorSize) -> Option<RayTable> {
+        Some(self.0.cameras.get(camera_idx)?.table(sensor))
+    }
 }
 
 /// Leaves corners outside the calibrated area without a residual: no pixel there has a ray, and what

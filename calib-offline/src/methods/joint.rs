@@ -1,84 +1,81 @@
-//! The joint estimate as a method of the pipeline.
+//! The joint estimate as a method.
 
-use super::solution::{FoldError, Solution, Solved, Task, folds_wanted};
-use crate::adjust::{Observations, StopReason};
-use crate::error::Error;
-use crate::evaluate::half_data::first_half;
+use super::solution::{came_to_rest, positive};
+use super::{Given, Method, MethodError, Own, Solution};
+use crate::adjust::Observations;
 use crate::evaluate::held_out::Estimated;
-use crate::evaluate::{cross_check, estimate_folds};
+use crate::evaluate::{CrossChecks, cross_check};
+use crate::field::Rig;
 use crate::init::rig::start_rig;
 use crate::joint::{Estimate, EstimateError, estimate, estimate_screened};
-use crate::pipeline::Method;
 use crate::progress::Progress;
 use crate::report::record::ChoicesRecord;
+use std::collections::BTreeSet;
 
-/// Screens, estimates, and checks: against itself, and without the poses of each fold.
-///
-/// # Errors
-/// Data that cannot determine the answer.
-pub fn joint_solution(
-    offered: &Observations,
-    task: &Task,
-    progress: &dyn Progress,
-) -> Result<Solved, Error> {
-    progress.begin("initialize", 1);
-    let start = start_rig(offered)?;
-    progress.end();
+/// Ray fields, poses and board shape of all views together.
+#[derive(Debug, Clone, Copy)]
+pub struct Joint;
 
-    progress.begin("estimate", 1);
-    let (mut estimate, findings) = estimate_screened(offered, start)?;
-    let mut rig = estimate.rig(task.names);
-    estimate.fill_uncertainty(&mut rig)?;
-    progress.end();
+impl Method for Joint {
+    fn name(&self) -> &'static str {
+        "joint"
+    }
 
-    let choices = choices(&mut estimate)?;
-    let folds = folds_wanted(&estimate.observations, task.folds);
-    let half = first_half(estimate.observations.poses.iter().copied(), task.placement);
-    let half = (task.folds > 0).then_some(&half);
-    progress.begin("cross-checks", folds);
-    let (folds, checks) = rayon::join(
-        || estimate_folds(&estimate.observations, folds, &estimate_joint, progress),
-        || cross_check(&estimate, &rig, half),
-    );
-    progress.end();
-    let is_settled = matches!(
-        estimate.stop,
-        StopReason::Converged | StopReason::NoFurtherDecrease
-    );
-    Ok(Solved {
-        solution: Solution {
-            method: Method::Joint,
+    fn title(&self) -> &'static str {
+        "ray field, joint"
+    }
+
+    /// Screens the views, unless that was done, and estimates.
+    fn fit(&self, given: &Given, progress: &dyn Progress) -> Result<Solution, MethodError> {
+        let (mut estimate, findings) = if let Some(found) = given.joint {
+            progress.begin("estimate", 1);
+            found.clone()?
+        } else {
+            progress.begin("initialize", 1);
+            let start = start_rig(given.observations)?;
+            progress.end();
+            progress.begin("estimate", 1);
+            estimate_screened(given.observations, start)?
+        };
+        let mut rig = estimate.rig(given.names);
+        estimate.fill_uncertainty(&mut rig)?;
+        progress.end();
+        let choices = choices(&mut estimate)?;
+        Ok(Solution {
+            method: self.name(),
             findings,
             rig,
+            conversion_error_px: 0.0,
             rig_from_board: estimate.rig_from_board(),
-            board_shape: estimate.model.board_shape,
-            observations: estimate.observations,
-            residuals: estimate.residuals,
-            robust_weights: estimate.robust_weights,
+            board_shape: estimate.model.board_shape.clone(),
+            observations: estimate.observations.clone(),
+            residuals: estimate.residuals.clone(),
+            is_used: positive(&estimate.robust_weights),
+            robust_weights: estimate.robust_weights.clone(),
             sigma_px: estimate.noise.variance_px2.sqrt(),
-            costs: estimate.costs,
+            costs: estimate.costs.clone(),
             stop_reason: estimate.stop.to_string(),
-            settled: is_settled,
+            settled: came_to_rest(estimate.stop),
             choices: Some(choices),
             alternating: None,
-            ray_sources: None,
-            checks: Some(checks),
-        },
-        folds,
-    })
+            own: Box::new(estimate),
+        })
+    }
+
+    fn fit_some_poses(&self, training: &Observations, _: &Given) -> Result<Estimated, MethodError> {
+        let start = start_rig(training)?;
+        let estimate = estimate(&start.observations, &start)?;
+        Ok(Estimated {
+            rig: estimate.rig(&training.numbered_cameras()),
+            board_shape: estimate.model.board_shape,
+        })
+    }
 }
 
-/// The joint estimate of some training poses. The cameras of its rig are named by number.
-///
-/// # Errors
-/// [`FoldError`].
-pub fn estimate_joint(training: &Observations) -> Result<Estimated, FoldError<EstimateError>> {
-    let start = start_rig(training)?;
-    let estimate = estimate(&start.observations, &start).map_err(FoldError::Estimate)?;
-    Ok(Estimated {
-        rig: estimate.rig(&training.numbered_cameras()),
-        board_shape: estimate.model.board_shape,
-    })
+impl Own for Estimate {
+    fn check(&self, rig: &Rig, first_half: Option<&BTreeSet<usize>>) -> Option<CrossChecks> {
+        Some(cross_check(self, rig, first_half))
+    }
 }
 
 fn choices(estimate: &mut Estimate) -> Result<ChoicesRecord, EstimateError> {

@@ -1,238 +1,82 @@
-//! The methods that are compared: each gives a rig from the same observations. A further method is
-//! one more entry of [`CONTENDERS`].
+//! Ways from views of a board to a rig. Each is a file of its own: it implements [`Method`], gives a
+//! [`Solution`] and stands in [`METHODS`]. Whoever calibrates, checks or compares knows no more of it.
 
 pub mod alternating;
+pub mod error;
 pub mod joint;
+pub mod pinhole;
+pub mod screened;
 pub mod solution;
 
-use crate::adjust::Observations;
-use crate::adjust::robust::{relative_weights, reweight};
-use crate::board::BoardShape;
-use crate::error::Error;
-use crate::evaluate::held_out::Estimated;
-use crate::evaluate::reprojection::residuals;
-use crate::field::Rig;
-use crate::geometry::RigidTransform;
-use crate::init::rig::start_rig;
-use crate::joint::{Estimate, estimate_screened};
-use crate::methods::alternating::{estimate_alternating, estimate_rig};
-use crate::methods::joint::estimate_joint;
-use crate::pinhole::{Loss, PinholeError, RigSettings, Settings, calibrate_rig};
-use std::collections::BTreeMap;
+pub use alternating::Alternating;
+pub use error::MethodError;
+pub use joint::Joint;
+pub use pinhole::Pinhole;
+pub use screened::Screened;
+pub use solution::{Own, Solution};
 
-/// What all methods are given: the views that agree with each other, as the joint estimate finds
-/// them.
-#[derive(Debug)]
-pub struct Shared {
+use crate::adjust::Observations;
+use crate::evaluate::held_out::Estimated;
+use crate::evaluate::{Folds, estimate_folds};
+use crate::progress::Progress;
+use screened::JointFound;
+use std::collections::BTreeMap;
+use std::fmt::Debug;
+
+/// What a method is given.
+#[derive(Debug, Clone, Copy)]
+pub struct Given<'a> {
     /// The views.
-    pub observations: Observations,
-    /// The joint estimate that came of it on the way.
-    pub joint: Result<Estimate, Error>,
+    pub observations: &'a Observations,
+    /// Names of the cameras, in order.
+    pub names: &'a [String],
     /// Stage placement of the poses (by number) that belong to one.
-    pub placements: BTreeMap<usize, usize>,
+    pub placements: &'a BTreeMap<usize, usize>,
+    /// The joint estimate of these views, if their screening has made it.
+    pub joint: Option<&'a Result<JointFound, MethodError>>,
 }
 
-impl Shared {
-    /// Screens the views offered. Where there is no joint estimate they are taken as its start left
-    /// them, and without even a start as they were offered.
-    pub fn of(offered: &Observations, placements: BTreeMap<usize, usize>) -> Self {
-        let start = match start_rig(offered) {
-            Ok(start) => start,
-            Err(error) => {
-                return Self {
-                    observations: offered.clone(),
-                    joint: Err(error.into()),
-                    placements,
-                };
-            }
-        };
-        let started = start.observations.clone();
-        match estimate_screened(offered, start) {
-            Ok((estimate, _)) => Self {
-                observations: estimate.observations.clone(),
-                joint: Ok(estimate),
-                placements,
-            },
-            Err(error) => Self {
-                observations: started,
-                joint: Err(error.into()),
-                placements,
-            },
-        }
-    }
+/// A way from views to a rig.
+pub trait Method: Debug + Sync {
+    /// Its name in files.
+    fn name(&self) -> &'static str;
 
-    /// The joint estimate.
+    /// What it is called in words.
+    fn title(&self) -> &'static str;
+
+    /// From all views.
     ///
     /// # Errors
-    /// [`Failure`] with why there is none.
-    pub fn joint(&self) -> Result<&Estimate, Failure> {
-        self.joint.as_ref().map_err(|error| Failure(chain(error)))
-    }
+    /// [`MethodError`] if the data cannot determine the answer.
+    fn fit(&self, given: &Given, progress: &dyn Progress) -> Result<Solution, MethodError>;
 
-    /// Stage placement of a pose.
-    pub fn placement(&self, pose: usize) -> Option<usize> {
-        self.placements.get(&pose).copied()
-    }
+    /// From the views of some poses, which are among those given. The cameras of the rig are named by
+    /// number.
+    ///
+    /// # Errors
+    /// As [`Self::fit`].
+    fn fit_some_poses(
+        &self,
+        training: &Observations,
+        given: &Given,
+    ) -> Result<Estimated, MethodError>;
 }
 
-/// What a method made of all that it was given.
-#[derive(Debug)]
-pub struct Fitted {
-    /// The cameras.
-    pub rig: Rig,
-    /// Per pose of the observations; `None` where the method could not place the board.
-    pub rig_from_board: Vec<Option<RigidTransform>>,
-    /// Out-of-plane shape of the board.
-    pub board_shape: BoardShape,
-    /// Per view and corner: whether it was used, and not rejected as an outlier.
-    pub is_used: Vec<Vec<bool>>,
-    /// Largest difference of the rig's rays from the method's own, px; 0 where these are the rig's.
-    pub conversion_error_px: f64,
-}
+/// All methods, in the order of tables. The first is what the others are measured against; the last is
+/// the program's own.
+pub const METHODS: [&dyn Method; 3] = [&Pinhole, &Alternating, &Joint];
 
-/// A method in a comparison.
-#[derive(Debug, Clone, Copy)]
-pub struct Contender {
-    /// Its name in files.
-    pub name: &'static str,
-    /// What it is called in words.
-    pub title: &'static str,
-    /// From everything; the cameras named as given.
-    pub fit: fn(&Shared, &[String]) -> Result<Fitted, Failure>,
-    /// From some poses. The cameras of its rig are named by number.
-    pub fold: fn(&Shared, &Observations) -> Result<Estimated, Failure>,
-}
-
-/// Why a method has no answer, in words.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct Failure(pub String);
-
-/// The methods, in the order of the table. The first is what the others are measured against.
-pub const CONTENDERS: [Contender; 3] = [
-    Contender {
-        name: "baseline",
-        title: "pinhole, Brown-Conrady",
-        fit: |shared, names| fit_baseline(&shared.observations, names),
-        fold: |_, training| {
-            let fitted = fit_baseline(training, &training.numbered_cameras())?;
-            Ok(Estimated {
-                rig: fitted.rig,
-                board_shape: fitted.board_shape,
-            })
-        },
-    },
-    Contender {
-        name: "alternating",
-        title: "rays one by one, alternating",
-        fit: fit_alternating,
-        fold: |shared, training| {
-            estimate_alternating(training, &|pose| shared.placement(pose))
-                .map_err(|error| Failure(error.to_string()))
-        },
-    },
-    Contender {
-        name: "joint",
-        title: "ray field, joint",
-        fit: fit_joint,
-        fold: |_, training| estimate_joint(training).map_err(|error| Failure(error.to_string())),
-    },
-];
-
-/// The baseline. Its residuals count as the joint estimate's do, so that outliers decide for nobody.
-fn fit_baseline(observations: &Observations, names: &[String]) -> Result<Fitted, Failure> {
-    let failure = |error: PinholeError| Failure(error.to_string());
-    let settings = RigSettings {
-        adjustment: Settings {
-            loss: Loss::StudentT,
-            ..Settings::default()
-        },
-        ..RigSettings::default()
-    };
-    let pinhole = calibrate_rig(observations, &settings).map_err(failure)?;
-    let found = pinhole.rig(names, observations).map_err(failure)?;
-    Ok(Fitted {
-        rig: found.rig,
-        rig_from_board: found.rig_from_board,
-        board_shape: BoardShape::default(),
-        is_used: pinhole.is_used,
-        conversion_error_px: found.worst_error_px,
-    })
-}
-
-/// The published procedure. Corners count as used where the joint estimate's weights would keep them.
-fn fit_alternating(shared: &Shared, names: &[String]) -> Result<Fitted, Failure> {
-    let start = start_rig(&shared.observations).map_err(|error| Failure(error.to_string()))?;
-    let (found, fields) = estimate_rig(&start, names, &|pose| shared.placement(pose))
-        .map_err(|error| Failure(error.to_string()))?;
-    let placed = found.poses_by_number();
-    let rig_from_board: Vec<Option<RigidTransform>> = shared
-        .observations
-        .poses
-        .iter()
-        .map(|pose| placed.get(pose).copied())
-        .collect();
-    let board_shape = BoardShape::default();
-    let is_used = used_corners(
-        &fields.rig,
-        &rig_from_board,
-        &board_shape,
-        &shared.observations,
-    );
-    // Of single rays, which carry noise that the field does not.
-    let conversion_error_px = fields.rms_error_px.iter().copied().fold(0.0, f64::max);
-    Ok(Fitted {
-        rig: fields.rig,
-        rig_from_board,
-        board_shape,
-        is_used,
-        conversion_error_px,
-    })
-}
-
-/// Per view and corner: whether its residual is no outlier among those of its like.
-fn used_corners(
-    rig: &Rig,
-    rig_from_board: &[Option<RigidTransform>],
-    board_shape: &BoardShape,
+/// A method's answers without the poses of each fold, for the check on boards that it never saw.
+pub fn fit_folds(
+    method: &dyn Method,
+    given: &Given,
     observations: &Observations,
-) -> Vec<Vec<bool>> {
-    let poses: Vec<RigidTransform> = rig_from_board
-        .iter()
-        .map(|pose| pose.unwrap_or_else(RigidTransform::identity))
-        .collect();
-    let mut residuals = residuals(rig, &poses, board_shape, observations);
-    for (view, residuals) in observations.views.iter().zip(&mut residuals) {
-        if rig_from_board[view.pose_idx].is_none() {
-            residuals.fill(None);
-        }
-    }
-    let (noise, _) = reweight(&residuals, observations, 1.0, None);
-    relative_weights(&residuals, observations, &noise)
-        .into_iter()
-        .map(|weights| weights.into_iter().map(|weight| weight > 0.0).collect())
-        .collect()
-}
-
-fn fit_joint(shared: &Shared, names: &[String]) -> Result<Fitted, Failure> {
-    let estimate = shared.joint()?;
-    let is_used = estimate.robust_weights.iter();
-    Ok(Fitted {
-        rig: estimate.rig(names),
-        rig_from_board: estimate.rig_from_board().into_iter().map(Some).collect(),
-        board_shape: estimate.model.board_shape.clone(),
-        is_used: is_used
-            .map(|weights| weights.iter().map(|weight| *weight > 0.0).collect())
-            .collect(),
-        conversion_error_px: 0.0,
-    })
-}
-
-/// An error and its innermost cause.
-fn chain(error: &Error) -> String {
-    let mut cause: &dyn std::error::Error = error;
-    while let Some(inner) = cause.source() {
-        cause = inner;
-    }
-    cause.to_string()
+    folds: usize,
+    progress: &dyn Progress,
+) -> Folds {
+    let fit = |training: &Observations| {
+        let found = method.fit_some_poses(training, given);
+        found.map_err(|error| error.reason())
+    };
+    estimate_folds(observations, folds, &fit, progress)
 }

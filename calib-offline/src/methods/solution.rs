@@ -1,45 +1,41 @@
 //! What a method found, whichever it was: all that the record, the report and a comparison need.
 
-use crate::adjust::Observations;
-use crate::alternating::rays::RaySource;
+use crate::adjust::robust::{StudentT, relative_weights, reweight};
+use crate::adjust::{Observations, StopReason};
 use crate::board::BoardShape;
-use crate::dataset::sufficiency::MIN_POSES;
-use crate::evaluate::{CrossChecks, Folds};
-use crate::field::Rig;
-use crate::geometry::RigidTransform;
-use crate::init::InitError;
+use crate::evaluate::CrossChecks;
+use crate::evaluate::known_points::{Points, measure};
+use crate::field::{RayTable, Rig};
+use crate::geometry::{RigidTransform, SensorSize};
 use crate::init::screening::Finding;
-use crate::pipeline::Method;
+use crate::matches::source::{PointSource, RigSource, Sighting};
 use crate::report::record::{AlternatingRecord, ChoicesRecord};
 use nalgebra::Vector2;
-
-/// What a method is to do.
-pub struct Task<'a> {
-    /// Names of the cameras, in order.
-    pub names: &'a [String],
-    /// Folds of the check on unseen boards; 0 leaves it out, and the comparison of two halves too.
-    pub folds: usize,
-    /// Placement of the stage that a pose belongs to.
-    pub placement: &'a (dyn Fn(usize) -> Option<usize> + Sync),
-}
+use std::collections::BTreeSet;
+use std::fmt::Debug;
 
 /// A calibration as a method gives it.
 #[derive(Debug)]
 pub struct Solution {
-    /// Which method.
-    pub method: Method,
+    /// Name of the method.
+    pub method: &'static str,
     /// What went in: poses that the method could not place are not in it.
     pub observations: Observations,
     /// What was found wrong with views on the way.
     pub findings: Vec<Finding>,
     /// The cameras. Its frame is the board at the datum pose.
     pub rig: Rig,
+    /// Largest difference of the rig's rays from the method's own, px; 0 where these are the rig's.
+    pub conversion_error_px: f64,
     /// Per pose of the observations.
     pub rig_from_board: Vec<RigidTransform>,
     /// Out-of-plane shape of the board.
     pub board_shape: BoardShape,
     /// Observed minus predicted, px, per view and corner; `None` where nothing is predicted.
     pub residuals: Vec<Vec<Option<Vector2<f64>>>>,
+    /// Per view and corner: whether it was learned from, and not rejected as an outlier. With a weight
+    /// of 0 it still may be, where no ray of the rig tells how well it fits.
+    pub is_used: Vec<Vec<bool>>,
     /// Robust weight per view and corner, 0 to 1; 0 is a corner that is rejected or has no residual.
     pub robust_weights: Vec<Vec<f64>>,
     /// Standard deviation of the corner noise per axis, px.
@@ -54,13 +50,42 @@ pub struct Solution {
     pub choices: Option<ChoicesRecord>,
     /// How the published procedure went, if it was that.
     pub alternating: Option<AlternatingRecord>,
-    /// One ray per pixel and camera as the method has them; `None` where it has a field.
-    pub ray_sources: Option<Vec<RaySource>>,
-    /// Checks of the calibration against itself, where the method has them.
-    pub checks: Option<CrossChecks>,
+    /// What else the method has.
+    pub own: Box<dyn Own>,
+}
+
+/// What a method has beside a rig. One that has no more leaves all as it is.
+pub trait Own: Debug + Send + Sync {
+    /// What it measures points with (rig frame), where its own rays are not those of the rig.
+    fn rays(&self) -> Option<&dyn PointSource<Number = f64>> {
+        None
+    }
+
+    /// Its own rays of a camera's pixels, where they are not those of the rig.
+    fn ray_table(&self, _camera_idx: usize, _sensor: SensorSize) -> Option<RayTable> {
+        None
+    }
+
+    /// Checks of the calibration against itself; `rig` is that of the solution, `first_half` has the
+    /// poses of one half, `None` if halves are not to be compared.
+    fn check(&self, _rig: &Rig, _first_half: Option<&BTreeSet<usize>>) -> Option<CrossChecks> {
+        None
+    }
 }
 
 impl Solution {
+    /// Points of matches by the method's own rays, rig frame, mm.
+    pub fn measure(&self, matches: &[Vec<Sighting<f64>>]) -> Points {
+        if let Some(rays) = self.own.rays() {
+            return measure(rays, matches);
+        }
+        // Without a frame there is always a source.
+        RigSource::new(&self.rig, None).map_or_else(
+            || vec![None; matches.len()],
+            |source| measure(&source, matches),
+        )
+    }
+
     /// Number of different poses that went in; one that was split counts once.
     pub fn pose_count(&self) -> usize {
         self.observations.different_pose_count()
@@ -84,15 +109,6 @@ impl Solution {
     }
 }
 
-/// A solution, and the same method's answers without the poses of each fold.
-#[derive(Debug)]
-pub struct Solved {
-    /// From all poses.
-    pub solution: Solution,
-    /// For the check on unseen boards.
-    pub folds: Folds,
-}
-
 /// Corners of a view that did not count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Unused {
@@ -114,22 +130,33 @@ pub fn unused(residuals: &[Option<Vector2<f64>>], weights: &[f64]) -> Unused {
     }
 }
 
-/// Why some training poses gave no estimate; `E` is the method's own error.
-#[derive(Debug, thiserror::Error)]
-pub enum FoldError<E> {
-    /// No start.
-    #[error(transparent)]
-    Start(#[from] InitError),
-    /// No estimate.
-    #[error(transparent)]
-    Estimate(E),
+/// The views of the poses that were placed, and where their boards were: the others take no part.
+pub(super) fn placed_part(
+    observations: &Observations,
+    rig_from_board: &[Option<RigidTransform>],
+) -> (Observations, Vec<RigidTransform>) {
+    let used = observations.with_pose_indices(|pose_idx| rig_from_board[pose_idx].is_some());
+    (used, rig_from_board.iter().flatten().copied().collect())
 }
 
-/// So many folds, or none with too few poses to leave some out.
-pub fn folds_wanted(used: &Observations, folds: usize) -> usize {
-    if used.different_pose_count() >= 2 * MIN_POSES {
-        folds
-    } else {
-        0
-    }
+/// Whether an adjustment ended where it would stay.
+pub(super) fn came_to_rest(stop: StopReason) -> bool {
+    matches!(stop, StopReason::Converged | StopReason::NoFurtherDecrease)
+}
+
+/// Noise that residuals show, and how much each counts: as in the joint estimate.
+pub(super) fn weighted(
+    residuals: &[Vec<Option<Vector2<f64>>>],
+    observations: &Observations,
+) -> (StudentT, Vec<Vec<f64>>) {
+    let (noise, _) = reweight(residuals, observations, 1.0, None);
+    (noise, relative_weights(residuals, observations, &noise))
+}
+
+/// Which weights are above 0.
+pub(super) fn positive(weights: &[Vec<f64>]) -> Vec<Vec<bool>> {
+    let views = weights.iter();
+    views
+        .map(|weights| weights.iter().map(|weight| *weight > 0.0).collect())
+        .collect()
 }

@@ -27,6 +27,8 @@ pub struct Parts<'a> {
     pub solution: &'a Solution,
     /// The check on unseen boards.
     pub held_out: &'a HeldOut,
+    /// Checks of the calibration against itself, where the method has them.
+    pub checks: Option<&'a CrossChecks>,
     /// What counts as good.
     pub thresholds: &'a Thresholds,
 }
@@ -51,7 +53,7 @@ pub fn record(parts: &Parts) -> Calibration {
             rms_px: summary.rms_px,
             held_out_rms_px: held_out.as_ref().and_then(|h| h.rms_px),
             neighbor_rms_percent: held_out.as_ref().and_then(|h| h.neighbor_rms_percent),
-            half_data_ratio: solution.checks.as_ref().and_then(half_data_ratio),
+            half_data_ratio: parts.checks.and_then(half_data_ratio),
             corners: (summary.corners_used, summary.corners_rejected),
             suspect_views: (solution.findings.len(), parts.observations.views.len()),
             pose_count: solution.pose_count(),
@@ -67,7 +69,7 @@ pub fn record(parts: &Parts) -> Calibration {
     Calibration {
         schema: SCHEMA.to_string(),
         tool_version: env!("CARGO_PKG_VERSION").to_string(),
-        method: solution.method.name().to_string(),
+        method: solution.method.to_string(),
         input_sha256: input_sha256(parts.dataset, &parts.corners.views),
         board: parts.dataset.board,
         board_shape: solution.board_shape.clone(),
@@ -81,7 +83,7 @@ pub fn record(parts: &Parts) -> Calibration {
         choices: solution.choices.clone(),
         alternating: solution.alternating.clone(),
         held_out,
-        checks: solution.checks.clone(),
+        checks: parts.checks.cloned(),
         verdict,
     }
 }

@@ -32,7 +32,7 @@ fn args(folder: &Path) -> CalibrateArgs {
     CalibrateArgs {
         dataset: folder.to_owned(),
         output: folder.join("deep/results"),
-        method: Method::Joint,
+        method: MethodArg::Joint,
         exclude: vec![3, 17],
         seed: 1,
         ray_tables: false,
@@ -86,7 +86,7 @@ fn estimate_never(
     _: &Dataset,
     _: &CalibrateSettings,
     _: &dyn Progress,
-) -> Result<Calibrated, Error> {
+) -> Result<Calibrated, CalibrateError> {
     panic!("refused too late")
 }
 
@@ -108,7 +108,7 @@ fn an_estimate_that_fails_leaves_no_folder() {
     dataset(folder.path());
     let args = args(folder.path());
     let error = run(&args, &console(), &|_, _, _| {
-        Err(Error::Sufficiency(SufficiencyError::NoCorners))
+        Err(SufficiencyError::NoCorners.into())
     })
     .unwrap_err();
     assert_eq!(error.exit_code(), 3);
@@ -139,12 +139,12 @@ fn the_method_and_the_ray_tables_asked_for_are_made_and_written() {
     let folder = tempfile::tempdir().unwrap();
     dataset(folder.path());
     let args = CalibrateArgs {
-        method: Method::Alternating,
+        method: MethodArg::Alternating,
         ray_tables: true,
         ..args(folder.path())
     };
     let estimate = |_: &Dataset, settings: &CalibrateSettings, _: &dyn Progress| {
-        assert!(settings.method == Method::Alternating && settings.ray_tables);
+        assert!(settings.method.name() == "alternating" && settings.ray_tables);
         let calibration = example::calibration();
         let cameras = calibration.rig.cameras.iter();
         Ok(Calibrated {
@@ -176,5 +176,8 @@ fn a_dataset_with_broken_corners_is_refused() {
         &crate::pipeline::calibrate,
     )
     .unwrap_err();
-    assert!(matches!(error, Error::Corners(CornersError::Empty { .. })));
+    let Error::Calibrate(CalibrateError::Corners(error)) = error else {
+        panic!("{error}");
+    };
+    assert!(matches!(error, CornersError::Empty { .. }));
 }

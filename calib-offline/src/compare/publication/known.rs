@@ -1,9 +1,9 @@
 //! Points whose truth is known: absolute error against the distance. Only simulated datasets have them.
 
+use super::ExperimentError;
 use super::methods::{Method, MethodRun};
 use super::target::{measure_all, middle};
 use crate::dataset::Dataset;
-use crate::error::Error;
 use crate::evaluate::known_points::{TruthErrors, beside_truth, compare_with_truth};
 use crate::geometry::{PixelPoint, best_placement, rms};
 use crate::matches::{TruePoint, read_known};
@@ -62,7 +62,7 @@ pub struct KnownExperiment {
 pub fn run(
     dataset: &Dataset,
     runs: &[MethodRun],
-) -> Result<Result<KnownExperiment, String>, Error> {
+) -> Result<Result<KnownExperiment, String>, ExperimentError> {
     let (mut items, mut truth) = (Vec::new(), Vec::new());
     for known in read_known::<f64>(&dataset.folder, &camera_names(dataset))? {
         for sightings in &known.matches {

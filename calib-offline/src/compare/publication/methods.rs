@@ -6,7 +6,7 @@ use crate::alternating::{self, AlternatingEstimate, AlternatingSettings};
 use crate::field::Rig;
 use crate::geometry::{PixelPoint, Ray, RigidTransform, triangulate_pair, triangulate_rays};
 use crate::init::rig::start_rig;
-use crate::methods::Shared;
+use crate::methods::Given;
 use crate::pinhole::{PinholeRig, RigSettings, calibrate_rig};
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -155,11 +155,11 @@ pub fn calibrated(runs: &[MethodRun]) -> impl Iterator<Item = (Method, &Calibrat
 }
 
 /// Runs all methods on the same screened corners, and brings them to one frame.
-pub fn run_all(shared: &Shared, names: &[String]) -> Vec<MethodRun> {
+pub fn run_all(given: &Given) -> Vec<MethodRun> {
     let mut runs = vec![
-        run(Method::Baseline, baseline(&shared.observations)),
-        run(Method::Alternating, alternating(shared)),
-        run(Method::Joint, joint(shared, names)),
+        run(Method::Baseline, baseline(given.observations)),
+        run(Method::Alternating, alternating(given)),
+        run(Method::Joint, joint(given)),
     ];
     share_datum(&mut runs);
     runs
@@ -184,9 +184,9 @@ fn baseline(observations: &Observations) -> Result<Calibrated, String> {
     Ok(Calibrated::new(Box::new(rig), numbers.zip(poses), places))
 }
 
-fn alternating(shared: &Shared) -> Result<Calibrated, String> {
-    let start = start_rig(&shared.observations).map_err(|error| error.to_string())?;
-    let placement = |pose| shared.placement(pose);
+fn alternating(given: &Given) -> Result<Calibrated, String> {
+    let start = start_rig(given.observations).map_err(|error| error.to_string())?;
+    let placement = |pose: usize| given.placements.get(&pose).copied();
     let estimate = alternating::estimate(&start, &placement, &AlternatingSettings::default())
         .map_err(|error| error.to_string())?;
     let poses = estimate.rig_from_board.clone();
@@ -201,9 +201,10 @@ fn alternating(shared: &Shared) -> Result<Calibrated, String> {
     })
 }
 
-fn joint(shared: &Shared, names: &[String]) -> Result<Calibrated, String> {
-    let estimate = shared.joint().map_err(|error| error.to_string())?;
-    let rig = estimate.rig(names);
+fn joint(given: &Given) -> Result<Calibrated, String> {
+    let found = given.joint.ok_or("nothing was screened")?;
+    let (estimate, _) = found.as_ref().map_err(|error| error.reason())?;
+    let rig = estimate.rig(given.names);
     let places = rig.cameras.iter().map(|c| c.rig_from_camera.translation_mm);
     let places = places.collect();
     let poses = estimate.rig_from_board().into_iter().map(Some);

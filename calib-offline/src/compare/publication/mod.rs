@@ -12,6 +12,7 @@
 //! [`tables`] and [`words`] say what was found.
 
 pub mod auxiliary;
+pub mod error;
 pub mod figures;
 pub mod known;
 pub mod methods;
@@ -23,15 +24,15 @@ pub mod tables;
 pub mod target;
 pub mod words;
 
+pub use error::ExperimentError;
+
 use crate::dataset::Dataset;
 use crate::dataset::corners::poses;
 use crate::dataset::stage::{entry, placements};
 use crate::detect::DetectSettings;
-use crate::error::Error;
-use crate::methods::Shared;
+use crate::methods::Screened;
 use crate::pipeline::{self, camera_names, explained, offered};
 use crate::progress::Progress;
-use crate::remedy::Remedy;
 use methods::{Method, MethodRun};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -104,40 +105,15 @@ pub struct LeftOut {
     pub reason: String,
 }
 
-/// Why experiments came to nothing.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ExperimentError {
-    /// A file with the truth of a simulated dataset.
-    #[error("{}: is not the truth of this dataset: {problem}", file.display())]
-    Truth {
-        /// The file.
-        file: PathBuf,
-        /// What is wrong.
-        problem: String,
-    },
-}
-
-impl Remedy for ExperimentError {
-    fn remedy(&self) -> Option<String> {
-        let text = match self {
-            Self::Truth { .. } => {
-                "simulate the dataset anew, or delete the file: experiments that need it are then left out"
-            }
-        };
-        Some(text.to_owned())
-    }
-}
-
 /// Runs all experiments that a dataset allows.
 ///
 /// # Errors
-/// Unusable input; the joint estimate's own error if no method has an answer; [`ExperimentError`].
+/// [`ExperimentError`]: unusable input; the joint estimate's own error if no method has an answer.
 pub fn evaluate(
     dataset: &Dataset,
     settings: &ExperimentSettings,
     progress: &dyn Progress,
-) -> Result<Evaluation, Error> {
+) -> Result<Evaluation, ExperimentError> {
     let corners = pipeline::corners(dataset, &DetectSettings::default(), progress)?;
     let offered = offered(dataset, &corners)?;
     let names = camera_names(dataset);
@@ -146,14 +122,14 @@ pub fn evaluate(
 
     progress.begin("calibrate with three methods", 0);
     let placements = placements(dataset, &corners.views);
-    let shared = Shared::of(&offered.observations, placements);
-    let runs = methods::run_all(&shared, &names);
+    let screened = Screened::of(&offered.observations);
+    let runs = methods::run_all(&screened.given(&names, &placements));
     progress.end();
-    let observations = &shared.observations;
+    let observations = &screened.observations;
     if runs.iter().all(|run| run.outcome.is_err())
-        && let Err(error) = shared.joint
+        && let Err(error) = &screened.joint
     {
-        return Err(explained(error, dataset, &offered.views));
+        return Err(explained(error.clone(), dataset, &offered.views).into());
     }
 
     progress.begin("networks of many spreads", 0);

@@ -2,9 +2,8 @@
 //! 15 x 13 corners, the target of 63 ring markers at distances about 350 mm. Corners carry 0.05 px of
 //! noise; the target's markers are found in rendered images.
 
-use super::{Evaluation, ExperimentSettings, evaluate};
+use super::{Evaluation, ExperimentError, ExperimentSettings, evaluate};
 use crate::dataset::Dataset;
-use crate::error::Error;
 use crate::progress::Progress;
 use crate::simulate::{
     OpticsKind, OutputSettings, Scene, SceneSettings, SimulateError, write_dataset,
@@ -48,7 +47,7 @@ fn recordings() -> [Recording; 2] {
 pub fn evaluate_set_up(
     settings: &ExperimentSettings,
     progress: &dyn Progress,
-) -> Result<Vec<Evaluation>, Error> {
+) -> Result<Vec<Evaluation>, ExperimentError> {
     let scratch = tempfile::tempdir().map_err(|source| SimulateError::Io {
         path: std::env::temp_dir(),
         source,

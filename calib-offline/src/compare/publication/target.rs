@@ -9,7 +9,6 @@ use crate::dataset::{Dataset, TargetSpec};
 use crate::detect::ring_target::{
     MarkerMatch, TargetError, TargetSettings, join_markers, target_views,
 };
-use crate::error::Error;
 use crate::evaluate::measured_board::MeasuredBoard;
 use crate::geometry::{best_placement, rms};
 use crate::progress::Progress;
@@ -135,7 +134,7 @@ pub fn run(
     dataset: &Dataset,
     runs: &[MethodRun],
     progress: &dyn Progress,
-) -> Result<Result<TargetExperiment, String>, Error> {
+) -> Result<Result<TargetExperiment, String>, ExperimentError> {
     let views = match target_views(dataset, &TargetSettings::default(), progress) {
         Ok(views) => views,
         Err(

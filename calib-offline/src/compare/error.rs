@@ -1,0 +1,26 @@
+//! Why methods cannot be compared.
+
+use crate::matches::MatchesError;
+use crate::pipeline::CalibrateError;
+use crate::remedy::Remedy;
+
+/// Why methods cannot be compared.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CompareError {
+    /// Unusable input, or no method has an answer.
+    #[error(transparent)]
+    Calibrate(#[from] CalibrateError),
+    /// Files of matches whose truth is known.
+    #[error(transparent)]
+    Matches(#[from] MatchesError),
+}
+
+impl Remedy for CompareError {
+    fn remedy(&self) -> Option<String> {
+        match self {
+            Self::Calibrate(error) => error.remedy(),
+            Self::Matches(error) => error.remedy(),
+        }
+    }
+}

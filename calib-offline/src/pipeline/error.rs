@@ -1,0 +1,96 @@
+//! Why a dataset gives no calibration.
+
+use crate::dataset::{CornersError, SufficiencyError};
+use crate::detect::DetectError;
+use crate::detect::suspicion::LabelSuspicion;
+use crate::methods::MethodError;
+use crate::remedy::Remedy;
+
+/// Why a dataset gives no calibration.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CalibrateError {
+    /// The corners of the dataset.
+    #[error("the corners of the dataset cannot be used")]
+    Corners(#[from] CornersError),
+    /// The search for corners in the images.
+    #[error("the corners cannot be found")]
+    Detect(#[from] DetectError),
+    /// A pose to leave out that there is not.
+    #[error(transparent)]
+    Exclude(#[from] NoSuchPose),
+    /// Corners that no method could work with.
+    #[error("these corners cannot determine a calibration")]
+    Sufficiency(#[from] SufficiencyError),
+    /// Images that show too little of the board.
+    #[error("{refused} of {total} images were refused; the first: {first}")]
+    FewImages {
+        /// Images that were refused.
+        refused: usize,
+        /// Images looked at.
+        total: usize,
+        /// The file and the reason of the first one refused.
+        first: String,
+        /// What is missing.
+        source: SufficiencyError,
+    },
+    /// Labels that contradict each other, found after no method had an answer.
+    #[error("the corners do not belong together as they are labelled: {suspicion}")]
+    Labels {
+        /// What is suspected.
+        suspicion: LabelSuspicion,
+        /// The failure that it explains.
+        source: MethodError,
+    },
+    /// No answer.
+    #[error(transparent)]
+    Method(#[from] MethodError),
+}
+
+/// A pose to leave out that the recording does not have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("there is no pose {pose} to leave out; the last is pose {last}")]
+pub struct NoSuchPose {
+    /// The pose asked for.
+    pub pose: usize,
+    /// The last pose.
+    pub last: usize,
+}
+
+impl CalibrateError {
+    /// Whether the input can be used, and the data cannot determine the answer.
+    pub fn is_undetermined(&self) -> bool {
+        match self {
+            Self::Corners(_) | Self::Exclude(_) => false,
+            Self::Detect(error) => matches!(error, DetectError::Consistency(_)),
+            Self::Sufficiency(_)
+            | Self::FewImages { .. }
+            | Self::Labels { .. }
+            | Self::Method(_) => true,
+        }
+    }
+}
+
+impl Remedy for CalibrateError {
+    fn remedy(&self) -> Option<String> {
+        match self {
+            Self::Corners(error) => error.remedy(),
+            Self::Detect(error) => error.remedy(),
+            Self::Exclude(error) => error.remedy(),
+            Self::Sufficiency(error) => error.remedy(),
+            Self::FewImages { .. } => Some(
+                "correct dataset.toml or the images as the reason says; calib-offline detect DATASET \
+                 --overlay DIR gives the reason for every image"
+                    .to_owned(),
+            ),
+            Self::Labels { suspicion, .. } => suspicion.remedy(),
+            Self::Method(error) => error.remedy(),
+        }
+    }
+}
+
+impl Remedy for NoSuchPose {
+    fn remedy(&self) -> Option<String> {
+        Some("poses count from 0; see calib-offline inspect DATASET".to_owned())
+    }
+}
