@@ -11,6 +11,7 @@ mod common;
 use calib_offline::alternating::alternation::AlternationSettings;
 use calib_offline::alternating::{AlternatingSettings, estimate};
 use calib_offline::init::rig::start_rig;
+use calib_offline::methods::alternating::SingleRays;
 use calib_offline::simulate::{MatchSet, OpticsKind, Scene, SceneSettings};
 use common::against_truth::{errors_and_share, observations};
 use common::{Arguments, Result, print_table};
@@ -96,16 +97,16 @@ fn draw(kind: OpticsKind, seed: u64, settings: &AlternatingSettings) -> Result<D
     let observations = observations(&scene, &scene.observe_corners());
     let start = start_rig(&observations)?;
     let placement = |pose: usize| scene.pose_placements.get(pose).copied();
-    let found = estimate(&start, &placement, settings)?;
+    let rays = SingleRays(estimate(&start, &placement, settings)?);
     let measure =
-        |set| errors_and_share(&found, &scene.matches(set, MATCHES)).ok_or("nothing was measured");
+        |set| errors_and_share(&rays, &scene.matches(set, MATCHES)).ok_or("nothing was measured");
     let (points, share) = measure(MatchSet::Points)?;
     let (holdout, _) = measure(MatchSet::Holdout)?;
     Ok(Drawn {
         points: points.placed_ratio,
         holdout: holdout.placed_ratio,
         share,
-        sweeps: found.alternated.rms_mm.len() - 1,
+        sweeps: rays.0.alternated.rms_mm.len() - 1,
     })
 }
 

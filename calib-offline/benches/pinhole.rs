@@ -11,6 +11,7 @@ mod common;
 use calib_offline::adjust::Observations;
 use calib_offline::geometry::RigidTransform;
 use calib_offline::init::focal_scan::start_camera;
+use calib_offline::methods::pinhole::PinholeRays;
 use calib_offline::pinhole::adjustment::{Free, State, minimize};
 use calib_offline::pinhole::{
     BrownCamera, Loss, PinholeRig, Refine, RigSettings, Settings, calibrate_rig, stereo,
@@ -90,7 +91,8 @@ fn draw(optics: OpticsKind, seed: u64) -> Result<Drawn> {
     )?;
     let sets = [MatchSet::Points, MatchSet::Holdout].map(|set| scene.matches(set, MATCHES));
     let ratio = |rig: &PinholeRig| -> Result<(f64, f64)> {
-        let [points, holdout] = [0, 1].map(|k| errors_and_share(rig, &sets[k]));
+        let rays = PinholeRays::new(rig.clone());
+        let [points, holdout] = [0, 1].map(|k| errors_and_share(&rays, &sets[k]));
         let (points, holdout) = points.zip(holdout).ok_or("no point was measured")?;
         Ok((points.0.placed_ratio, holdout.0.placed_ratio))
     };

@@ -15,6 +15,7 @@ use calib_offline::alternating::{
 use calib_offline::evaluate::known_points::TruthErrors;
 use calib_offline::geometry::RigidTransform;
 use calib_offline::init::rig::start_rig;
+use calib_offline::methods::alternating::SingleRays;
 use calib_offline::methods::{Alternating, Given, Method as _};
 use calib_offline::progress::Silent;
 use calib_offline::simulate::{MatchSet, OpticsKind, Scene};
@@ -28,7 +29,8 @@ fn run(scene: &Scene, settings: &AlternatingSettings) -> AlternatingEstimate {
 
 /// Errors of points, and the share of the matches that has a ray in both cameras.
 fn measure(scene: &Scene, found: &AlternatingEstimate) -> (TruthErrors, f64) {
-    errors_and_share(found, &scene.matches(MatchSet::Points, 1500)).unwrap()
+    let rays = SingleRays(found.clone());
+    errors_and_share(&rays, &scene.matches(MatchSet::Points, 1500)).unwrap()
 }
 
 #[test]

@@ -2,13 +2,13 @@
 
 use calib_offline::adjust::Observations;
 use calib_offline::board::BoardSpec;
-use calib_offline::compare::publication::methods::Measurer;
 use calib_offline::dataset::View;
 use calib_offline::evaluate::known_points::{PointWithTruth, TruthErrors, compare_with_truth};
 use calib_offline::geometry::{PixelPoint, RigidTransform, best_placement, so3};
 use calib_offline::init::rig::start_rig;
 use calib_offline::init::screening::{Finding, FindingKind};
 use calib_offline::joint::{Estimate, estimate_screened};
+use calib_offline::matches::source::{PointSource, RigSource};
 use calib_offline::simulate::{
     CameraOptics, MatchSet, OpticsKind, Scene, SceneSettings, TrueMatch,
 };
@@ -130,7 +130,8 @@ pub fn measure(scene: &Scene, estimate: &Estimate, noisy: bool) -> Measured {
 /// Errors of one set of matches with noisy pixels, and the share that was not measured.
 pub fn measure_set(scene: &Scene, estimate: &Estimate, set: MatchSet) -> (TruthErrors, f64) {
     let rig = estimate.rig(&NAMES.map(str::to_owned));
-    let (errors, share) = errors_and_share(&rig, &scene.matches(set, MATCHES)).unwrap();
+    let source = RigSource::new(&rig, None).unwrap();
+    let (errors, share) = errors_and_share(&source, &scene.matches(set, MATCHES)).unwrap();
     (errors, 1.0 - share)
 }
 
@@ -147,23 +148,25 @@ fn measured_points(
     } else {
         |m| &m.true_pixels
     };
-    let points = points_with_truth(&rig, &matches, pixels);
+    let source = RigSource::new(&rig, None).unwrap();
+    let points = points_with_truth(&source, &matches, pixels);
     let outside = matches.len() - points.len();
     (points, outside)
 }
 
 /// Points of the matches that can be measured, beside their truth.
 pub fn points_with_truth(
-    measurer: &dyn Measurer,
+    source: &dyn PointSource<Number = f64>,
     matches: &[TrueMatch],
     pixels: fn(&TrueMatch) -> &[PixelPoint],
 ) -> Vec<PointWithTruth> {
     matches
         .iter()
         .filter_map(|m| {
-            let sightings: Vec<_> = pixels(m).iter().copied().enumerate().collect();
+            let pixels = pixels(m).iter().enumerate();
+            let sightings: Vec<_> = pixels.map(|(k, p)| (k, [p.u, p.v])).collect();
             Some(PointWithTruth {
-                measured_mm: measurer.point(&sightings)?,
+                measured_mm: source.point(&sightings).ok()?.point_mm.into(),
                 true_mm: m.point_in_datum,
                 oracle_mm: m.oracle_in_datum,
             })
@@ -174,10 +177,10 @@ pub fn points_with_truth(
 /// Errors of matches with noisy pixels, and the share that was measured; `None` if that is nothing
 /// to speak of.
 pub fn errors_and_share(
-    measurer: &dyn Measurer,
+    source: &dyn PointSource<Number = f64>,
     matches: &[TrueMatch],
 ) -> Option<(TruthErrors, f64)> {
-    let points = points_with_truth(measurer, matches, |m| &m.pixels);
+    let points = points_with_truth(source, matches, |m| &m.pixels);
     let share = points.len() as f64 / matches.len() as f64;
     Some((compare_with_truth(&points)?, share))
 }

@@ -2,10 +2,10 @@
 
 use super::Evaluation;
 use super::known::KnownExperiment;
-use super::methods::Method;
 use super::spread::{PUBLISHED_CHOICE_PX, SpreadExperiment, SpreadPoint};
 use super::stage::StageExperiment;
 use super::target::{CloudPoint, TargetExperiment, TargetMethod, TargetPose};
+use crate::methods::METHODS;
 use crate::report::plot::axes::round_up;
 use crate::report::plot::chart::{Axis, Mark, PLOT, Panel, Series, draw};
 
@@ -29,12 +29,12 @@ pub fn figures(evaluation: &Evaluation) -> Vec<(&'static str, String)> {
     figures
 }
 
-/// Every method has its color in all figures.
-const fn color(method: Method) -> usize {
-    match method {
-        Method::Baseline => 1,
-        Method::Alternating => 2,
-        Method::Joint => 0,
+/// Every method has its color in all figures: the program's own is always the first.
+fn color(method: &str) -> usize {
+    let place = METHODS.iter().position(|known| known.name() == method);
+    match place {
+        Some(place) if place + 1 < METHODS.len() => place + 1,
+        _ => 0,
     }
 }
 
@@ -156,7 +156,7 @@ fn stage_figure(stage: &StageExperiment) -> String {
                     let mut points: Vec<[f64; 2]> =
                         here.map(|a| [a.dial_deg, a.error_deg]).collect();
                     points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-                    let name = format!("{}, RMS {:.4} deg", method.method.name(), method.rms_deg);
+                    let name = format!("{}, RMS {:.4} deg", method.method, method.rms_deg);
                     series(&name, color(method.method), Mark::LineDots, points)
                 })
                 .collect(),
@@ -167,7 +167,7 @@ fn stage_figure(stage: &StageExperiment) -> String {
 }
 
 fn cloud_figure(target: &TargetExperiment) -> String {
-    let method = target.cloud_method.map_or("", Method::name);
+    let method = target.cloud_method.unwrap_or("");
     let views: [(&str, [&str; 2], [usize; 2]); 2] = [
         (
             "Seen along z",
@@ -285,7 +285,7 @@ fn distance_panels(
                     .filter_map(|p| Some([p.distance_mm, of(p)?]))
                     .collect();
                 points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-                let name = method.method.name();
+                let name = method.method;
                 series(name, color(method.method), Mark::LineDots, points)
             };
             target.methods.iter().map(one).collect()
@@ -320,7 +320,7 @@ fn distance_panels(
             .iter()
             .map(|method| {
                 let points = method.bins.iter().map(|b| [b.distance_mm, b.placed_rms_mm]);
-                let name = method.method.name();
+                let name = method.method;
                 series(name, color(method.method), Mark::LineDots, points.collect())
             })
             .collect();

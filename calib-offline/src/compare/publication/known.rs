@@ -1,12 +1,12 @@
 //! Points whose truth is known: absolute error against the distance. Only simulated datasets have them.
 
 use super::ExperimentError;
-use super::methods::{Method, MethodRun};
-use super::target::{measure_all, middle};
+use super::runs::{MethodRun, measure_all};
+use super::target::middle;
 use crate::dataset::Dataset;
 use crate::evaluate::known_points::{TruthErrors, beside_truth, compare_with_truth};
-use crate::geometry::{PixelPoint, best_placement, rms};
-use crate::matches::{TruePoint, read_known};
+use crate::geometry::{best_placement, rms};
+use crate::matches::{Sighting, TruePoint, read_known};
 use crate::pipeline::camera_names;
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -28,8 +28,8 @@ pub struct Bin {
 /// What a method measured.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct KnownMethod {
-    /// Which.
-    pub method: Method,
+    /// Its name.
+    pub method: &'static str,
     /// Matches that it has no point for.
     pub without_point: usize,
     /// All points together.
@@ -63,43 +63,38 @@ pub fn run(
     dataset: &Dataset,
     runs: &[MethodRun],
 ) -> Result<Result<KnownExperiment, String>, ExperimentError> {
-    let (mut items, mut truth) = (Vec::new(), Vec::new());
-    for known in read_known::<f64>(&dataset.folder, &camera_names(dataset))? {
-        for sightings in &known.matches {
-            let pixels = sightings
-                .iter()
-                .map(|&(camera_idx, [u, v])| (camera_idx, PixelPoint::new(u, v)));
-            items.push(pixels.collect::<Vec<_>>());
-        }
+    let (mut matches, mut truth) = (Vec::new(), Vec::new());
+    for known in read_known(&dataset.folder, &camera_names(dataset))? {
+        matches.extend(known.matches);
         truth.extend(known.truth);
     }
-    if items.is_empty() {
+    if matches.is_empty() {
         return Ok(Err(
             "the dataset has no matches.csv or holdout.csv with their truth".to_owned(),
         ));
     }
-    Ok(Ok(experiment(runs, &items, &truth)))
+    Ok(Ok(experiment(runs, &matches, &truth)))
 }
 
 fn experiment(
     runs: &[MethodRun],
-    items: &[Vec<(usize, PixelPoint)>],
+    matches: &[Vec<Sighting<f64>>],
     truth: &[TruePoint],
 ) -> KnownExperiment {
-    let measured = measure_all(runs, items);
-    let common: Vec<usize> = (0..items.len())
+    let measured = measure_all(runs, matches);
+    let common: Vec<usize> = (0..matches.len())
         .filter(|k| measured.is_common[*k])
         .collect();
     let mut middles = Vec::new();
     let mut methods = Vec::new();
-    for (method, calibrated, points) in &measured.methods {
+    for (method, found, points) in &measured.methods {
         // A method that does not decide which points are common may lack some of them.
         let paired = beside_truth(points, truth, |k| measured.is_common[k]);
         let from: Vec<Vector3<f64>> = paired.iter().map(|p| p.measured_mm).collect();
         let to: Vec<Vector3<f64>> = paired.iter().map(|p| p.true_mm).collect();
         let mut bins_of_method = Vec::new();
         if let Some(placement) = best_placement(&from, &to) {
-            let cameras = placement.point(&middle(&calibrated.cameras_in_datum));
+            let cameras = placement.point(&middle(&found.cameras_in_datum));
             middles.push(cameras);
             let errors: Vec<(f64, f64)> = paired
                 .iter()
@@ -111,7 +106,7 @@ fn experiment(
             bins_of_method = bins(errors);
         }
         methods.push(KnownMethod {
-            method: *method,
+            method,
             without_point: points.iter().filter(|point| point.is_none()).count(),
             errors: compare_with_truth(&paired),
             bins: bins_of_method,
@@ -123,7 +118,7 @@ fn experiment(
         ((at - cameras).norm(), (oracle - at).norm())
     });
     KnownExperiment {
-        matches: items.len(),
+        matches: matches.len(),
         common: common.len(),
         // The simulation's frame is the board at pose 0.
         frame_is_true: runs.iter().all(|run| run.datum_pose == 0),

@@ -8,15 +8,15 @@
 //! | [`target`] | the measurement target: point cloud, error against distance | Fig. 10, 11 |
 //! | [`known`] | points with known truth: absolute error against distance | |
 //!
-//! [`methods`] calibrates; [`paper`] simulates a copy of the publication's set-up; [`figures`],
+//! [`runs`] has all methods calibrate; [`paper`] simulates a copy of the publication's set-up; [`figures`],
 //! [`tables`] and [`words`] say what was found.
 
 pub mod auxiliary;
 pub mod error;
 pub mod figures;
 pub mod known;
-pub mod methods;
 pub mod paper;
+pub mod runs;
 pub mod spread;
 pub mod stage;
 pub mod statistics;
@@ -33,7 +33,7 @@ use crate::detect::DetectSettings;
 use crate::methods::Screened;
 use crate::pipeline::{self, camera_names, explained, offered};
 use crate::progress::Progress;
-use methods::{Method, MethodRun};
+use runs::MethodRun;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -88,8 +88,8 @@ pub struct Evaluation {
 /// What came of a method.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MethodOutcome {
-    /// Which.
-    pub method: Method,
+    /// Its name.
+    pub method: &'static str,
     /// Poses that it placed.
     pub placed_poses: usize,
     /// Why there is nothing of it.
@@ -123,7 +123,7 @@ pub fn evaluate(
     progress.begin("calibrate with three methods", 0);
     let placements = placements(dataset, &corners.views);
     let screened = Screened::of(&offered.observations);
-    let runs = methods::run_all(&screened.given(&names, &placements));
+    let runs = runs::run_all(&screened.given(&names, &placements));
     progress.end();
     let observations = &screened.observations;
     if runs.iter().all(|run| run.outcome.is_err())
@@ -133,7 +133,7 @@ pub fn evaluate(
     }
 
     progress.begin("networks of many spreads", 0);
-    let chosen_px = methods::calibrated(&runs).find_map(|(_, calibrated)| calibrated.spread_px);
+    let chosen_px = runs::solved(&runs).find_map(|(_, found)| found.spread_px());
     let spread = spread::run(observations, scene.as_ref(), chosen_px, settings);
     progress.end();
     let spread = noted(&mut left_out, "error against spread", spread);

@@ -1,6 +1,6 @@
 //! Angle of each pose about the stage's axis against the dial (publication, Fig. 8).
 
-use super::methods::{Calibrated, Method, MethodRun, calibrated};
+use super::runs::{InDatum, MethodRun, solved};
 use crate::dataset::stage::StageEntry;
 use crate::evaluate::fit_stage_axes;
 use crate::geometry::{RigidTransform, rms, so3};
@@ -24,8 +24,8 @@ pub struct StageAngle {
 /// What a method found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MethodAngles {
-    /// Which.
-    pub method: Method,
+    /// Its name.
+    pub method: &'static str,
     /// RMS over all poses, degrees.
     pub rms_deg: f64,
     /// RMS per placement of what is not a turn about the axis, degrees.
@@ -49,8 +49,8 @@ pub fn run(
     runs: &[MethodRun],
     entry: &dyn Fn(usize) -> StageEntry,
 ) -> Result<StageExperiment, String> {
-    let methods: Vec<MethodAngles> = calibrated(runs)
-        .filter_map(|(method, calibrated)| angles(method, calibrated, entry))
+    let methods: Vec<MethodAngles> = solved(runs)
+        .filter_map(|(method, found)| angles(method, found, entry))
         .collect();
     if methods.is_empty() {
         return Err(
@@ -62,11 +62,11 @@ pub fn run(
 }
 
 fn angles(
-    method: Method,
-    calibrated: &Calibrated,
+    method: &'static str,
+    found: &InDatum,
     entry: &dyn Fn(usize) -> StageEntry,
 ) -> Option<MethodAngles> {
-    let poses = &calibrated.datum_from_board;
+    let poses = &found.datum_from_board;
     let axes = fit_stage_axes(poses, |pose| {
         entry(pose).angle_deg.and(entry(pose).placement)
     });

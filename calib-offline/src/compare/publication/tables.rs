@@ -52,11 +52,7 @@ fn stage_table(stage: &StageExperiment) -> String {
             let _ = writeln!(
                 text,
                 "{},{},{},{},{}",
-                method.method.name(),
-                angle.placement,
-                angle.pose,
-                angle.dial_deg,
-                angle.error_deg
+                method.method, angle.placement, angle.pose, angle.dial_deg, angle.error_deg
             );
         }
     }
@@ -88,7 +84,7 @@ fn distance_table(target: Option<&TargetExperiment>, known: Option<&KnownExperim
             let _ = writeln!(
                 text,
                 "target,{},{},{},{},{},{},{},{neighbor},{truth}",
-                method.method.name(),
+                method.method,
                 pose.pose,
                 pose.distance_mm,
                 errors.count,
@@ -109,7 +105,7 @@ fn distance_table(target: Option<&TargetExperiment>, known: Option<&KnownExperim
     };
     if let Some(known) = known {
         for method in &known.methods {
-            known_rows(method.method.name(), &method.bins);
+            known_rows(method.method, &method.bins);
         }
         known_rows("oracle", &known.oracle);
     }

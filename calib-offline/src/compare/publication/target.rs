@@ -2,7 +2,7 @@
 //! and 11). Its markers are known to each other, so no truth of the rig is needed.
 
 use super::ExperimentError;
-use super::methods::{Calibrated, Method, MethodRun, Pixels, calibrated};
+use super::runs::{InDatum, MethodRun, measure_all};
 use super::statistics::ErrorStatistics;
 use crate::board::BoardSpec;
 use crate::dataset::{Dataset, TargetSpec};
@@ -11,6 +11,7 @@ use crate::detect::ring_target::{
 };
 use crate::evaluate::measured_board::MeasuredBoard;
 use crate::geometry::{best_placement, rms};
+use crate::matches::Sighting;
 use crate::progress::Progress;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -39,8 +40,8 @@ pub struct TargetPose {
 /// What a method measured.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TargetMethod {
-    /// Which.
-    pub method: Method,
+    /// Its name.
+    pub method: &'static str,
     /// Markers that it has no point for.
     pub without_point: usize,
     /// Distances from the best-placed nominal target, all poses together.
@@ -80,48 +81,10 @@ pub struct TargetExperiment {
     /// Per method.
     pub methods: Vec<TargetMethod>,
     /// Which method the point cloud is of.
-    pub cloud_method: Option<Method>,
+    pub cloud_method: Option<&'static str>,
     /// The point cloud.
     #[serde(skip)]
     pub cloud: Vec<CloudPoint>,
-}
-
-/// The points of a method, one per item, `None` where it has none.
-pub type Points = Vec<Option<Vector3<f64>>>;
-
-/// Points per method, and which of them can be compared.
-pub struct Measured<'a> {
-    /// The methods that have a calibration.
-    pub methods: Vec<(Method, &'a Calibrated, Points)>,
-    /// Whether every method that measures at all has a point for the item.
-    pub is_common: Vec<bool>,
-}
-
-/// Measures items with all methods. One that measures less than half of them does not decide what
-/// the others are judged by.
-pub fn measure_all<'a>(
-    runs: &'a [MethodRun],
-    items: &[Vec<(usize, crate::geometry::PixelPoint)>],
-) -> Measured<'a> {
-    use rayon::prelude::*;
-    let methods: Vec<_> = calibrated(runs)
-        .map(|(method, calibrated)| {
-            let points: Vec<_> = items
-                .par_iter()
-                .map(|pixels: &Vec<_>| calibrated.point(&pixels[..] as &Pixels))
-                .collect();
-            (method, calibrated, points)
-        })
-        .collect();
-    let decides =
-        |points: &[Option<Vector3<f64>>]| 2 * points.iter().flatten().count() >= points.len();
-    let is_common = (0..items.len())
-        .map(|k| {
-            let mut deciding = methods.iter().filter(|(.., points)| decides(points));
-            deciding.all(|(.., points)| points[k].is_some())
-        })
-        .collect();
-    Measured { methods, is_common }
 }
 
 /// Measures the target of a dataset with all methods.
@@ -160,11 +123,14 @@ fn experiment(
     truth: &Truth,
     runs: &[MethodRun],
 ) -> TargetExperiment {
-    let items: Vec<Vec<_>> = matches
+    let sightings: Vec<Vec<Sighting<f64>>> = matches
         .iter()
-        .map(|m| m.pixels.iter().copied().enumerate().collect())
+        .map(|m| {
+            let pixels = m.pixels.iter().enumerate();
+            pixels.map(|(k, pixel)| (k, [pixel.u, pixel.v])).collect()
+        })
         .collect();
-    let measured = measure_all(runs, &items);
+    let measured = measure_all(runs, &sightings);
     // A target is a board of markers.
     let board = BoardSpec {
         rows: target.rows,
@@ -173,7 +139,7 @@ fn experiment(
     };
     let mut methods = Vec::new();
     let (mut cloud_method, mut cloud) = (None, Vec::new());
-    for (method, calibrated, points) in &measured.methods {
+    for (method, solution, points) in &measured.methods {
         let mut by_pose: BTreeMap<usize, MeasuredBoard> = BTreeMap::new();
         for ((found, point), common) in matches.iter().zip(points).zip(&measured.is_common) {
             if let (Some(point), true) = (point, common) {
@@ -186,7 +152,7 @@ fn experiment(
             .iter()
             .flat_map(|(pose, measured)| cloud_of(*pose, measured, &board))
             .collect();
-        let mut found = judge(*method, &by_pose, &placed, calibrated, &board);
+        let mut found = judge(method, &by_pose, &placed, solution, &board);
         found.without_point = points.iter().filter(|point| point.is_none()).count();
         compare_with_truth(&mut found, &placed, |p| {
             truth.get(&target.marker_id(p.pose, p.row, p.col)).copied()
@@ -231,13 +197,13 @@ fn cloud_of(pose: usize, measured: &MeasuredBoard, board: &BoardSpec) -> Vec<Clo
 }
 
 fn judge(
-    method: Method,
+    method: &'static str,
     by_pose: &BTreeMap<usize, MeasuredBoard>,
     placed: &[CloudPoint],
-    calibrated: &Calibrated,
+    found: &InDatum,
     board: &BoardSpec,
 ) -> TargetMethod {
-    let middle_of_cameras = middle(&calibrated.cameras_in_datum);
+    let middle_of_cameras = middle(&found.cameras_in_datum);
     let (mut poses, mut all, mut neighbors) = (Vec::new(), Vec::new(), Vec::new());
     for (pose, measured) in by_pose {
         let here: Vec<&CloudPoint> = placed.iter().filter(|p| p.pose == *pose).collect();

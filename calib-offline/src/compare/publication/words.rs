@@ -2,10 +2,10 @@
 
 use super::Evaluation;
 use super::known::KnownExperiment;
-use super::methods::Method;
 use super::spread::SpreadExperiment;
 use super::stage::StageExperiment;
 use super::target::{TargetExperiment, TargetMethod};
+use crate::methods::METHODS;
 use crate::report::text::short;
 use std::fmt::Write as _;
 
@@ -49,7 +49,7 @@ fn section(evaluation: &Evaluation) -> String {
     );
     for outcome in &evaluation.methods {
         if let Some(reason) = &outcome.failed {
-            let _ = writeln!(text, "{}: failed, {reason}\n", outcome.method.name());
+            let _ = writeln!(text, "{}: failed, {reason}\n", outcome.method);
         }
     }
     if let Some(spread) = &evaluation.spread {
@@ -131,7 +131,7 @@ fn stage_words(stage: &StageExperiment) -> String {
         let _ = writeln!(
             text,
             "| {} | {} | {} | {} |",
-            method.method.name(),
+            method.method,
             short(method.rms_deg),
             short(worst.fold(0.0, f64::max)),
             wobbles.join(", ")
@@ -158,7 +158,7 @@ fn target_words(target: &TargetExperiment) -> String {
         let _ = writeln!(
             text,
             "| {} | {} | {} | {} | {} | {} | {} | {} |",
-            method.method.name(),
+            method.method,
             number(|e| e.mean_mm),
             number(|e| e.deviation_mm),
             number(|e| e.rms_mm),
@@ -193,7 +193,7 @@ fn known_words(known: &KnownExperiment) -> String {
         let _ = writeln!(
             text,
             "| {} | {} | {} | {} | {} |",
-            method.method.name(),
+            method.method,
             if known.frame_is_true {
                 number(|e| e.direct_rms_mm)
             } else {
@@ -217,9 +217,9 @@ fn published_table(evaluations: &[Evaluation]) -> String {
         "| publication | its own (alternating) | {PUBLISHED_MEAN_MM} | {PUBLISHED_DEVIATION_MM} |"
     );
     for evaluation in evaluations {
-        for method in Method::ALL {
+        for method in METHODS {
             let measured = evaluation.target.as_ref();
-            let found = measured.and_then(|t| t.methods.iter().find(|m| m.method == method));
+            let found = measured.and_then(|t| t.methods.iter().find(|m| m.method == method.name()));
             let number = |of: fn(&TargetMethod) -> Option<f64>| {
                 found.and_then(of).map_or("-".to_owned(), short)
             };
