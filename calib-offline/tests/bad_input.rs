@@ -23,7 +23,7 @@ fn refused(manifest: &str, corners: &[u8], code: i32, parts: &[&str]) {
     assert_eq!(object["schema"], "calib-offline/error/1");
     assert_eq!(object["exit_code"], code);
     assert!(object["remedy"].is_string());
-    run(folder.path(), &["compare", "set", "-o", "out"])
+    run(folder.path(), &["methods", "set", "-o", "out"])
         .assert_code(code)
         .assert_says(parts)
         .assert_says(&["error:", "try: "]);
@@ -187,7 +187,7 @@ fn output_path_that_is_a_file() {
     std::fs::write(folder.path().join("notes"), "mine").unwrap();
     let before = contents(folder.path());
     for place in ["notes", "notes/below", "set/corners.csv"] {
-        for verb in ["calibrate", "compare"] {
+        for verb in ["calibrate", "methods"] {
             run(folder.path(), &[verb, "set", "-o", place])
                 .assert_code(2)
                 .assert_says(&["is a file, a folder is needed"]);
@@ -437,7 +437,7 @@ fn labels_that_do_not_belong_together() {
     run(folder.path(), &["calibrate", "set", "-o", "out"])
         .assert_code(3)
         .assert_says(&["mirrored in pose 0", "try: number rows and columns alike"]);
-    run(folder.path(), &["compare", "set"])
+    run(folder.path(), &["methods", "set"])
         .assert_code(3)
         .assert_says(&["mirrored in pose 0", "try: number rows and columns alike"]);
     let inspected = run(folder.path(), &["inspect", "set"]);

@@ -85,6 +85,7 @@ fn every_help_starts_with_an_example() {
         "detect",
         "inspect",
         "measure",
+        "methods",
         "pack",
         "simulate",
     ] {
@@ -109,9 +110,9 @@ fn wrong_arguments_are_exit_code_2() {
         &["calibrate", "set"],
         &["calibrate", "set", "-o", "out", "--exclude", "three"],
         &["measure", "a", "b", "-o", "c", "--frme", "left"],
-        &["compare", "set", "--folds", "1"],
-        &["compare", "set", "--folds", "-3"],
-        &["compare"],
+        &["methods", "set", "--folds", "1"],
+        &["methods", "set", "--folds", "-3"],
+        &["methods"],
         &["inspect", "x", "-q", "-v"],
     ] {
         run(folder.path(), arguments).assert_code(2);

@@ -1,4 +1,4 @@
-//! `compare`, driven as a user drives it, on simulated recordings.
+//! `methods`, driven as a user drives it, on simulated recordings.
 
 mod common;
 
@@ -41,7 +41,7 @@ fn number(value: &Value) -> f64 {
 fn behind_a_port_the_ray_field_gains_and_the_files_say_so() {
     let folder = tempfile::tempdir().unwrap();
     simulate(folder.path(), "port");
-    let arguments = ["compare", "set", "-o", "out", "--json"];
+    let arguments = ["methods", "set", "-o", "out", "--json"];
     let first = run(folder.path(), &arguments);
     let object = first.assert_code(0).json();
     assert_eq!(object["schema"], "calib-offline/compare/1");
@@ -103,7 +103,7 @@ fn behind_a_port_the_ray_field_gains_and_the_files_say_so() {
 fn in_air_a_pinhole_is_enough() {
     let folder = tempfile::tempdir().unwrap();
     simulate(folder.path(), "brown");
-    let found = run(folder.path(), &["compare", "set", "-v"]);
+    let found = run(folder.path(), &["methods", "set", "-v"]);
     found.assert_code(0).assert_says(&["s with its folds"]);
     assert!(
         found.stdout.contains("A pinhole is enough here"),
@@ -138,7 +138,7 @@ fn one_camera_alone_is_compared_by_its_residuals() {
         .filter(|line| !line.starts_with("right"))
         .collect();
     fs::write(set.join("corners.csv"), left.join("\n")).unwrap();
-    let found = run(folder.path(), &["compare", "set", "--json"]);
+    let found = run(folder.path(), &["methods", "set", "--json"]);
     let object = found.assert_code(0).json();
     for name in ["baseline", "joint"] {
         let own = method(&object, name);
@@ -152,7 +152,7 @@ fn one_camera_alone_is_compared_by_its_residuals() {
 #[test]
 fn too_few_poses_for_folds_are_said() {
     let folder = dataset(MANIFEST, corners_csv(5).as_bytes());
-    let found = run(folder.path(), &["compare", "set"]);
+    let found = run(folder.path(), &["methods", "set"]);
     found.assert_code(0);
     for part in ["no held-out boards", "not compared on boards it never saw"] {
         assert!(found.stdout.contains(part), "{}", found.stdout);
@@ -177,7 +177,7 @@ fn a_damaged_table_of_true_points_is_refused() {
         (String::new(), "has 0 rows"),
     ] {
         fs::write(&truth, content).unwrap();
-        run(folder.path(), &["compare", "set", "-o", "out"])
+        run(folder.path(), &["methods", "set", "-o", "out"])
             .assert_code(2)
             .assert_says(&["matches_truth.csv", words, "try: "]);
         assert!(!folder.path().join("out").exists());
@@ -188,7 +188,7 @@ fn a_damaged_table_of_true_points_is_refused() {
 fn outliers_hide_no_difference() {
     let folder = tempfile::tempdir().unwrap();
     simulate_with(folder.path(), "port", &["--outliers", "0.05"]);
-    let object = run(folder.path(), &["compare", "set", "--json"])
+    let object = run(folder.path(), &["methods", "set", "--json"])
         .assert_code(0)
         .json();
     let outliers = number(&object["outliers"]) / number(&object["corners"]);
@@ -270,4 +270,23 @@ fn a_method_that_fails_leaves_the_others_standing() {
     ] {
         assert!(text.contains(part), "{text}");
     }
+}
+
+#[test]
+fn compare_says_that_methods_are_compared_by_another_verb() {
+    let folder = dataset(MANIFEST, corners_csv(5).as_bytes());
+    let before = contents(folder.path());
+    for more in [
+        &[][..],
+        &["-o", "out", "--folds", "5", "--force"],
+        &["b.json"],
+    ] {
+        run(folder.path(), &[&["compare", "set"], more].concat())
+            .assert_code(2)
+            .assert_says(&[
+                "calib-offline methods",
+                "try: calib-offline methods DATASET",
+            ]);
+    }
+    assert_eq!(contents(folder.path()), before);
 }

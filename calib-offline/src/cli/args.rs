@@ -1,8 +1,8 @@
 //! What can be written on the command line. Each help text starts with an example.
 
 use super::{
-    calibrate, demo, detect, device, evaluate, export, flash, inspect, measure, methods, pack,
-    simulate,
+    calibrate, compare, demo, detect, device, evaluate, export, flash, inspect, measure, methods,
+    pack, simulate,
 };
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::num::NonZeroUsize;
@@ -45,8 +45,9 @@ pub struct Cli {
 pub enum Verb {
     /// Calibrate from a dataset: calibration.json, rig.rays and report.html
     Calibrate(calibrate::CalibrateArgs),
-    /// Compare the ray field with a pinhole on the same boards
-    Compare(methods::CompareArgs),
+    /// Compare two calibrations: not yet
+    #[command(hide = true)]
+    Compare(compare::CompareArgs),
     /// Run the whole chain on the data that comes with the program
     Demo(demo::DemoArgs),
     /// Find the board's corners in a dataset's images: corners.csv
@@ -63,6 +64,8 @@ pub enum Verb {
     Inspect(inspect::InspectArgs),
     /// Triangulate matches
     Measure(measure::MeasureArgs),
+    /// Compare the ray field with a pinhole on the same boards
+    Methods(methods::MethodsArgs),
     /// Pack a calibration for the device within a proven error
     Pack(pack::PackArgs),
     /// Make a dataset with known truth

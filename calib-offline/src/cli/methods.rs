@@ -1,4 +1,4 @@
-//! `compare`: methods side by side on one dataset.
+//! `methods`: methods side by side on one dataset.
 
 use super::Outcome;
 use super::calibrate::say_what_is_used;
@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 
 const EXAMPLE: &str = "\
 Example:
-  calib-offline compare recordings/monday
-  calib-offline compare recordings/monday -o results/compared --folds 10";
+  calib-offline methods recordings/monday
+  calib-offline methods recordings/monday -o results/compared --folds 10";
 
 const FORMATS: &str = "\
 DATASET is a folder with dataset.toml and corners.csv or images, as for calibrate. Every method is
@@ -54,7 +54,7 @@ const FILES: [&str; 3] = ["comparison.json", "comparison.csv", "comparison.md"];
 /// The arguments.
 #[derive(Debug, Args)]
 #[command(before_help = EXAMPLE, after_help = FORMATS)]
-pub struct CompareArgs {
+pub struct MethodsArgs {
     /// The folder with dataset.toml
     #[arg(value_name = "DATASET")]
     pub dataset: PathBuf,
@@ -73,7 +73,7 @@ pub struct CompareArgs {
 ///
 /// # Errors
 /// [`Error`], with nothing written.
-pub fn run(args: &CompareArgs, console: &Console) -> Result<Outcome, Error> {
+pub fn run(args: &MethodsArgs, console: &Console) -> Result<Outcome, Error> {
     if let Some(folder) = &args.output {
         check_results_folder(folder, &FILES, args.force)?;
     }

@@ -5,6 +5,7 @@
 
 pub mod args;
 pub mod calibrate;
+pub mod compare;
 pub mod demo;
 pub mod detect;
 pub mod detect_target;
@@ -65,7 +66,7 @@ pub fn main() -> ExitCode {
 fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
     match verb {
         Verb::Calibrate(args) => calibrate::run(args, console, &crate::pipeline::calibrate),
-        Verb::Compare(args) => methods::run(args, console),
+        Verb::Compare(args) => compare::run(args),
         Verb::Demo(args) => demo::run(args, console),
         Verb::Detect(args) => recording::detect(args, console),
         Verb::Device(args) => device::run(args, console),
@@ -74,6 +75,7 @@ fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
         Verb::Flash(args) => flash::run(args, console),
         Verb::Inspect(args) => inspect::run(args, console),
         Verb::Measure(args) => measure::run(args, console),
+        Verb::Methods(args) => methods::run(args, console),
         Verb::Pack(args) => pack::run(args, console),
         Verb::Simulate(args) => recording::simulate(args, console),
     }

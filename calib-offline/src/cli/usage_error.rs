@@ -54,6 +54,12 @@ pub enum UsageError {
         /// The file.
         path: PathBuf,
     },
+    /// What `compare` did is done by `methods`.
+    #[error(
+        "compare is for two calibrations, and this version cannot compare them yet; methods are compared on \
+         one dataset by calib-offline methods"
+    )]
+    CompareIsMethods,
     /// The input would be replaced by the output.
     #[error("{}: is what the command reads", path.display())]
     OutputIsInput {
@@ -78,6 +84,7 @@ impl Remedy for UsageError {
             Self::NotPacked { .. } => {
                 "pack it first: calib-offline pack calibration.json -o rig.rays"
             }
+            Self::CompareIsMethods => "calib-offline methods DATASET, with the same options",
             Self::OutputIsInput { .. } => "choose another place with -o",
         };
         Some(text.to_owned())
