@@ -6,6 +6,7 @@
 
 pub mod error;
 mod left_out;
+mod parts;
 mod summary;
 
 pub use error::{CalibrateError, NoSuchPose};
@@ -27,6 +28,7 @@ use crate::field::RayTable;
 use crate::methods::{Given, Joint, Method, MethodError, Own, fit_folds};
 use crate::progress::Progress;
 use crate::report::Calibration;
+use parts::Parts;
 
 /// How to calibrate. Nothing here needs to be chosen by the user. Poses are left out by the
 /// dataset's own list.
@@ -189,7 +191,7 @@ pub fn calibrate_corners(
         || solution.own.check(&solution.rig, half),
     );
     progress.end();
-    let calibration = summary::record(&summary::Parts {
+    let calibration = summary::record(&Parts {
         dataset,
         corners,
         observations: &observations,

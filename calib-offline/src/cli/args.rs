@@ -1,11 +1,11 @@
 //! What can be written on the command line. Each help text starts with an example.
 
+use super::settings::CommonArgs;
 use super::{
     calibrate, compare, demo, detect, device, evaluate, export, flash, inspect, measure, methods,
     pack, simulate,
 };
-use clap::{Args, Parser, Subcommand, ValueEnum};
-use std::num::NonZeroUsize;
+use clap::{Parser, Subcommand};
 
 const EXAMPLE: &str = "\
 Example:
@@ -71,42 +71,4 @@ pub enum Verb {
     /// Make a dataset with known truth
     #[command(before_help = SIMULATE_EXAMPLE)]
     Simulate(simulate::SimulateArgs),
-}
-
-/// What holds for every verb.
-#[derive(Debug, Clone, Args)]
-pub struct CommonArgs {
-    /// Print one JSON object to standard output and nothing else
-    #[arg(long, global = true)]
-    pub json: bool,
-    /// Say nothing but errors on standard error
-    #[arg(short, long, global = true, conflicts_with = "verbose")]
-    pub quiet: bool,
-    /// Say more; twice says most
-    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
-    pub verbose: u8,
-    /// When to color the words that matter.
-    #[arg(
-        long,
-        global = true,
-        value_name = "WHEN",
-        default_value = "auto",
-        hide_possible_values = true,
-        help = "Color the words that matter: auto (on a terminal, unless NO_COLOR is set), always, never"
-    )]
-    pub color: ColorChoice,
-    /// Use so many threads [default: all]; results do not depend on it
-    #[arg(long, global = true, value_name = "COUNT")]
-    pub threads: Option<NonZeroUsize>,
-}
-
-/// When to color.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ColorChoice {
-    /// On a terminal.
-    Auto,
-    /// Everywhere.
-    Always,
-    /// Nowhere.
-    Never,
 }

@@ -1,7 +1,46 @@
-//! What the common arguments and the environment come to.
+//! The arguments that hold for every verb, and what they and the environment come to.
 
-use super::args::{ColorChoice, CommonArgs};
+use clap::{Args, ValueEnum};
 use std::io::IsTerminal;
+use std::num::NonZeroUsize;
+
+/// What holds for every verb.
+#[derive(Debug, Clone, Args)]
+pub struct CommonArgs {
+    /// Print one JSON object to standard output and nothing else
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Say nothing but errors on standard error
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Say more; twice says most
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    pub verbose: u8,
+    /// When to color the words that matter.
+    #[arg(
+        long,
+        global = true,
+        value_name = "WHEN",
+        default_value = "auto",
+        hide_possible_values = true,
+        help = "Color the words that matter: auto (on a terminal, unless NO_COLOR is set), always, never"
+    )]
+    pub color: ColorChoice,
+    /// Use so many threads [default: all]; results do not depend on it
+    #[arg(long, global = true, value_name = "COUNT")]
+    pub threads: Option<NonZeroUsize>,
+}
+
+/// When to color.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ColorChoice {
+    /// On a terminal.
+    Auto,
+    /// Everywhere.
+    Always,
+    /// Nowhere.
+    Never,
+}
 
 /// How a command shows itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

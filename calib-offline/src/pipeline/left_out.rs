@@ -1,6 +1,6 @@
 //! What did not go into the estimate as it was recorded, and why, for the record.
 
-use super::summary::Parts;
+use super::parts::Parts;
 use crate::detect::verdict::Outcome;
 use crate::init::screening::{Finding, FindingKind};
 use crate::methods::solution::{Unused, unused};

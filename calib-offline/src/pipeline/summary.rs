@@ -1,12 +1,11 @@
 //! What the steps found, put into the record.
 
-use super::Corners;
 use super::left_out::{left_out, renumbered};
-use crate::adjust::Observations;
+use super::parts::Parts;
 use crate::dataset::identity::input_sha256;
-use crate::dataset::{Dataset, stage};
+use crate::dataset::stage;
 use crate::evaluate::half_data::HalfDataCheck;
-use crate::evaluate::verdict::{Figures, Thresholds, judge};
+use crate::evaluate::verdict::{Figures, judge};
 use crate::evaluate::{CrossChecks, HeldOut, fit_stage_axes};
 use crate::geometry::rms;
 use crate::methods::solution::Solution;
@@ -14,24 +13,6 @@ use crate::report::record::{
     Calibration, CornerRecord, EstimateRecord, HeldOutRecord, PoseRecord, SCHEMA, StageAxis,
 };
 use nalgebra::Vector2;
-
-/// Results of all steps.
-pub struct Parts<'a> {
-    /// The dataset.
-    pub dataset: &'a Dataset,
-    /// All corners, excluded poses included.
-    pub corners: &'a Corners,
-    /// What was offered to the estimate.
-    pub observations: &'a Observations,
-    /// What the method made of it.
-    pub solution: &'a Solution,
-    /// The check on unseen boards.
-    pub held_out: &'a HeldOut,
-    /// Checks of the calibration against itself, where the method has them.
-    pub checks: Option<&'a CrossChecks>,
-    /// What counts as good.
-    pub thresholds: &'a Thresholds,
-}
 
 /// The record of a calibration.
 pub fn record(parts: &Parts) -> Calibration {

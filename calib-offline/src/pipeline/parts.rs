@@ -1,0 +1,26 @@
+//! What the steps found, for the record.
+
+use super::Corners;
+use crate::adjust::Observations;
+use crate::dataset::Dataset;
+use crate::evaluate::verdict::Thresholds;
+use crate::evaluate::{CrossChecks, HeldOut};
+use crate::methods::Solution;
+
+/// Results of all steps.
+pub struct Parts<'a> {
+    /// The dataset.
+    pub dataset: &'a Dataset,
+    /// All corners, excluded poses included.
+    pub corners: &'a Corners,
+    /// What was offered to the estimate.
+    pub observations: &'a Observations,
+    /// What the method made of it.
+    pub solution: &'a Solution,
+    /// The check on unseen boards.
+    pub held_out: &'a HeldOut,
+    /// Checks of the calibration against itself, where the method has them.
+    pub checks: Option<&'a CrossChecks>,
+    /// What counts as good.
+    pub thresholds: &'a Thresholds,
+}
