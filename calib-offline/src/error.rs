@@ -67,7 +67,7 @@ pub enum Error {
     Demo(#[source] DemoError),
     /// Experiments that came to nothing.
     #[error("the methods cannot be evaluated")]
-    Experiment(#[source] ExperimentError),
+    Experiment(#[source] Box<ExperimentError>),
     /// A request that cannot be met.
     #[error("the command cannot be run so")]
     Usage(#[from] UsageError),
@@ -126,7 +126,7 @@ impl From<ExperimentError> for Error {
             ExperimentError::Matches(error) => error.into(),
             ExperimentError::Target(error) => error.into(),
             ExperimentError::Simulate(error) => error.into(),
-            error @ ExperimentError::Truth { .. } => Self::Experiment(error),
+            error @ ExperimentError::Truth { .. } => Self::Experiment(Box::new(error)),
         }
     }
 }

@@ -252,17 +252,6 @@ pub fn estimate(
     })
 }
 
-impl AlternatingEstimate {
-    /// The poses that were placed, by their numbers in the dataset.
-    pub fn poses_by_number(&self) -> BTreeMap<usize, RigidTransform> {
-        let numbers = self.observations.poses.iter();
-        numbers
-            .zip(&self.rig_from_board)
-            .filter_map(|(number, pose)| Some((*number, (*pose)?)))
-            .collect()
-    }
-}
-
 /// A network per view: per camera and pose index.
 fn train(observations: &Observations, settings: &NetworkSettings) -> Vec<Vec<Option<PlaneMap>>> {
     let trained: Vec<Option<PlaneMap>> = observations
