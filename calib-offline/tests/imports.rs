@@ -4,10 +4,18 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From the bottom up; a module may import those of its own layer and of layers before it.
-const LAYERS: [&[&str]; 10] = [
-    &["geometry", "progress", "atomic_file", "in_order"],
-    &["board", "dataset"],
-    &["detect", "simulate", "field"],
+const LAYERS: [&[&str]; 12] = [
+    &[
+        "numerics",
+        "geometry",
+        "progress",
+        "atomic_file",
+        "in_order",
+    ],
+    &["board", "observed"],
+    &["dataset", "field"],
+    &["detect", "simulate", "measure"],
+    &["capture"],
     &["adjust"],
     &["init"],
     &["joint", "pinhole", "alternating"],

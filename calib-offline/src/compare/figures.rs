@@ -10,9 +10,10 @@ use crate::evaluate::held_out::{BoardErrors, Fold};
 use crate::evaluate::reprojection::residuals;
 use crate::evaluate::truth::{PointWithTruth, compare_with_truth};
 use crate::field::Rig;
-use crate::geometry::{RigidTransform, rms};
+use crate::geometry::RigidTransform;
 use crate::matches::KnownMatches;
-use crate::matches::source::{PointSource, RigSource};
+use crate::measure::{PointSource, RigSource};
+use crate::numerics::rms;
 use nalgebra::Vector3;
 
 /// Median distance of the boards' middles from the first camera, mm.

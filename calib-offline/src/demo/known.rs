@@ -1,8 +1,8 @@
 //! Matches of a simulated dataset, measured by the device's code and compared with their truth.
 
 use crate::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
-use crate::matches::source::BlobSource;
-use crate::matches::{MatchesError, PointSource, Sighting, read_known};
+use crate::matches::{BlobSource, MatchesError, read_known};
+use crate::measure::{PointSource, Sighting};
 use nalgebra::Vector3;
 use ray_runtime::RayBlob;
 use serde::Serialize;

@@ -7,7 +7,8 @@
 
 use super::epipolar::{FundamentalMatrix, Match};
 use super::matches_of;
-use crate::dataset::{Corner, Dataset, View};
+use crate::dataset::Dataset;
+use crate::observed::{Corner, View};
 use std::collections::BTreeMap;
 
 /// Another labelling explains the corners if their median distance from the epipolar lines shrinks

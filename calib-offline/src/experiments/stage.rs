@@ -3,7 +3,8 @@
 use super::methods::{Calibrated, Method, MethodRun, calibrated};
 use crate::dataset::stage::StageEntry;
 use crate::evaluate::fit_stage_axes;
-use crate::geometry::{RigidTransform, rms, so3};
+use crate::geometry::{RigidTransform, so3};
+use crate::numerics::rms;
 use crate::report::record::PoseRecord;
 use nalgebra::Vector3;
 use serde::Serialize;

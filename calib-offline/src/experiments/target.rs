@@ -11,7 +11,8 @@ use crate::detect::ring_target::{
 };
 use crate::error::Error;
 use crate::evaluate::measured_board::MeasuredBoard;
-use crate::geometry::{best_placement, rms};
+use crate::geometry::best_placement;
+use crate::numerics::rms;
 use crate::progress::Progress;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

@@ -1,8 +1,8 @@
 //! Matches of a simulated dataset with their truth beside them.
 
-use super::source::{Number, Sighting};
 use super::{MatchesError, read_matches};
 use crate::evaluate::truth::TruePoint;
+use crate::measure::{Number, Sighting};
 use std::path::Path;
 
 /// Files of matches that may stand in a dataset, each with `NAME_truth.csv` beside it.

@@ -4,12 +4,12 @@ use super::Method;
 use crate::adjust::Observations;
 use crate::alternating::rays::RaySource;
 use crate::board::BoardShape;
-use crate::dataset::sufficiency::MIN_POSES;
 use crate::evaluate::{CrossChecks, Folds};
 use crate::field::Rig;
 use crate::geometry::RigidTransform;
 use crate::init::InitError;
 use crate::init::screening::Finding;
+use crate::observed::MIN_POSES;
 use crate::report::record::{AlternatingRecord, ChoicesRecord};
 use nalgebra::Vector2;
 

@@ -9,7 +9,7 @@ use crate::dataset::{Dataset, stage};
 use crate::evaluate::half_data::HalfDataCheck;
 use crate::evaluate::verdict::{Figures, Thresholds, judge};
 use crate::evaluate::{CrossChecks, HeldOut, fit_stage_axes};
-use crate::geometry::rms;
+use crate::numerics::rms;
 use crate::report::record::{
     Calibration, CornerRecord, EstimateRecord, HeldOutRecord, PoseRecord, SCHEMA, StageAxis,
 };

@@ -2,13 +2,13 @@
 
 use calib_offline::adjust::Observations;
 use calib_offline::board::BoardSpec;
-use calib_offline::dataset::View;
 use calib_offline::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
 use calib_offline::experiments::methods::Measurer;
 use calib_offline::geometry::{PixelPoint, RigidTransform, best_placement, so3};
 use calib_offline::init::rig::start_rig;
 use calib_offline::init::screening::{Finding, FindingKind};
 use calib_offline::joint::{Estimate, estimate_screened};
+use calib_offline::observed::View;
 use calib_offline::simulate::{
     CameraOptics, MatchSet, OpticsKind, Scene, SceneSettings, TrueMatch,
 };

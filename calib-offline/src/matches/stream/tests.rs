@@ -1,5 +1,5 @@
 use super::*;
-use crate::matches::source::{Point, Sighting};
+use crate::measure::{Point, Sighting};
 use std::fmt::Write as _;
 
 /// x and y are the sums of the pixels, z the number of cameras. Pixels below zero are outside.
