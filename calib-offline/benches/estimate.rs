@@ -6,12 +6,12 @@
 //! less than wall time. Everything measured runs in a process of its own.
 
 use calib_offline::adjust::Observations;
-use calib_offline::dataset::View;
 use calib_offline::geometry::PixelPoint;
 use calib_offline::init::rig::start_rig;
 use calib_offline::joint::evidence::Smoothness;
 use calib_offline::joint::fit::Fit;
 use calib_offline::joint::{Estimate, estimate_screened};
+use calib_offline::observed::View;
 use calib_offline::simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
 use clap::ValueEnum;
 use std::fmt::Write as _;

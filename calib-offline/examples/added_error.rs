@@ -6,8 +6,9 @@
 //! ```
 
 use anyhow::{Context, bail};
+use calib_offline::matches::BlobSource;
 use calib_offline::matches::read_matches;
-use calib_offline::matches::source::{BlobSource, PointSource, RigSource};
+use calib_offline::measure::{PointSource, RigSource};
 use calib_offline::pack::AlignedBytes;
 use calib_offline::report::Calibration;
 use ray_runtime::RayBlob;

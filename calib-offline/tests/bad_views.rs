@@ -2,9 +2,9 @@
 
 mod common;
 
-use calib_offline::dataset::View;
 use calib_offline::init::InitError;
 use calib_offline::init::rig::start_rig;
+use calib_offline::observed::View;
 use calib_offline::simulate::OpticsKind;
 use common::against_truth::{
     Named, hand_held, measure, named, observations, run_scene, run_views, scene,

@@ -3,9 +3,10 @@
 
 use calib_offline::adjust::Observations;
 use calib_offline::board::BoardSpec;
+use calib_offline::dataset::Dataset;
 use calib_offline::dataset::corners::read_corners;
-use calib_offline::dataset::{Dataset, View};
 use calib_offline::geometry::so3;
+use calib_offline::observed::View;
 use calib_offline::pinhole::{PinholeRig, Refine, RigSettings, calibrate_rig};
 use calib_offline::simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
 use serde::Deserialize;

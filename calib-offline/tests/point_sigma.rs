@@ -5,8 +5,8 @@ mod common;
 
 use calib_offline::field::PairUncertainty;
 use calib_offline::field::uncertainty::packed;
-use calib_offline::matches::PointSource;
-use calib_offline::matches::source::{BlobSource, RigSource};
+use calib_offline::matches::BlobSource;
+use calib_offline::measure::{PointSource, RigSource};
 use calib_offline::pack::{AlignedBytes, PackSettings, pack};
 use calib_offline::report::Calibration;
 use calib_offline::simulate::{MatchSet, OpticsKind};

@@ -6,7 +6,6 @@
 //! with component b is `sum w (j_a . j_b) f g^T` over the functions f of a and g of b: products of
 //! tall matrices per view for the polynomials, a band for the spline.
 
-use super::banded::BandedMatrix;
 use super::model::{CameraModel, Model};
 use super::moments::FieldMoments;
 use super::observations::{Observations, ViewBasis, ViewBlock};
@@ -14,6 +13,7 @@ use super::residual::{Linearization, linearize};
 use crate::field::knot_order::KnotOrder;
 use crate::field::spline::AxisWeights;
 use crate::geometry::so3::skew;
+use crate::numerics::banded::BandedMatrix;
 use nalgebra::{DMatrix, DMatrixView, Dyn, Vector2, Vector3};
 
 /// Columns of the pose and of the extrinsics among a view's small columns; the board's terms and

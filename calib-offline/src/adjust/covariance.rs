@@ -1,13 +1,13 @@
 //! Covariance of what a model predicts: where cameras see points, given what they were fitted to.
 
 use super::assembly::Components;
-use super::cholesky::gram;
 use super::model::{Layout, Model};
 use super::normal_equations::{NormalEquations, parameters_to_columns};
 use super::reduced::{Eliminated, Reduced};
 use super::residual::linearize;
 use crate::geometry::PixelPoint;
 use crate::geometry::so3::skew;
+use crate::numerics::cholesky::gram;
 use nalgebra::{DMatrix, DVector, Matrix2x3, Vector3, Vector6};
 
 /// A point fixed in the board frame of one pose, seen at a pixel of one camera. Its predictions

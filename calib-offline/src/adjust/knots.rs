@@ -1,9 +1,9 @@
 //! The thin-plate energy of a spline's knots as a matrix, in the order in which they enter the
 //! equations. The two components of a knot are neighbors.
 
-use super::banded::BandedMatrix;
-use super::cholesky::BandedCholesky;
 use crate::field::knot_order::KnotOrder;
+use crate::numerics::banded::BandedMatrix;
+use crate::numerics::cholesky::BandedCholesky;
 
 /// Keeps the energy positive definite, and linear functions, which have no energy of their own, out
 /// of the spline: a constant in it would turn the camera, which only the held directions of the

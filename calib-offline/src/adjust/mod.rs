@@ -3,8 +3,6 @@
 //! everything.
 
 mod assembly;
-pub mod banded;
-pub mod cholesky;
 pub mod covariance;
 pub mod knots;
 pub mod levenberg;
@@ -14,7 +12,6 @@ pub mod normal_equations;
 pub mod objective;
 pub mod observations;
 pub mod priors;
-mod product;
 pub mod reduced;
 pub mod residual;
 pub mod robust;

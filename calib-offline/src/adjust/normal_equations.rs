@@ -8,7 +8,6 @@
 //! border), METHOD 2.5. Nothing is ever formed that couples knots densely.
 
 use super::assembly::{self, Components, EXTRINSICS, ViewSums};
-use super::cholesky::{BandedCholesky, gram};
 use super::model::{CameraModel, Layout, Model, Step};
 use super::objective::Weights;
 use super::observations::{Observations, ViewBasis};
@@ -16,6 +15,7 @@ use super::priors::Priors;
 use super::reduced::{Eliminated, Reduced};
 use super::spline_block::{BorderColumns, EliminatedSpline, SplineBlock};
 use crate::field::structured::StructuredBasis;
+use crate::numerics::cholesky::{BandedCholesky, gram};
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use rayon::prelude::*;
 

@@ -2,11 +2,11 @@
 //! change while parameters move computed once.
 
 use crate::board::BoardSpec;
-use crate::dataset::{Corner, View};
 use crate::field::polynomial::{self, AxisValues, Polynomial};
 use crate::field::spline::AxisWeights;
 use crate::field::{BaseLens, CoverageMask, FieldSample, RayField};
 use crate::geometry::{PixelPoint, SensorSize};
+use crate::observed::{Corner, View};
 use nalgebra::{DMatrix, Matrix2, Vector2, Vector3};
 use std::sync::Arc;
 

@@ -1,8 +1,8 @@
 //! What is known of the parameters beforehand: smoothness, and what is plausible.
 
-use super::banded::BandedMatrix;
 use super::knots::thin_plate;
 use super::model::{CameraModel, Model};
+use crate::numerics::banded::BandedMatrix;
 use nalgebra::DVector;
 use std::sync::Arc;
 

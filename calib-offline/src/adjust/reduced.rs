@@ -1,7 +1,7 @@
 //! The factorized normal equations: what the data leave open, without the inverse.
 
-use super::cholesky::BandedCholesky;
 use super::spline_block::EliminatedSpline;
+use crate::numerics::cholesky::BandedCholesky;
 use nalgebra::{Cholesky, DVector};
 
 /// The factorized equations.

@@ -8,9 +8,11 @@
 //! [`Components`]: super::assembly::Components
 
 use super::assembly::SplineSums;
-use super::banded::BandedMatrix;
-use super::cholesky::{BandedCholesky, gram};
-use super::product::{column_major, column_major_mut, multiply, row_major, row_major_mut};
+use crate::numerics::banded::BandedMatrix;
+use crate::numerics::cholesky::{BandedCholesky, gram};
+use crate::numerics::product::{
+    column_major, column_major_mut, multiply, row_major, row_major_mut,
+};
 use nalgebra::{DMatrix, DVector};
 
 /// The equations of one camera's spline.

@@ -7,7 +7,8 @@ use super::AlternatingEstimate;
 use super::rays::SupportedRay;
 use crate::field::from_rays::{FromRaysSettings, SampledRay, field_of_rays, ray_error_px};
 use crate::field::{BaseLens, CalibratedCamera, CoverageMask, Rig};
-use crate::geometry::{RigidTransform, SensorSize, rms};
+use crate::geometry::{RigidTransform, SensorSize};
+use crate::numerics::rms;
 
 /// Rays along the longer side of the sensor: two in each cell of the mask along each axis.
 const RAYS_ALONG_LONGER_SIDE: f64 = 96.0;

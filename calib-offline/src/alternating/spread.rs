@@ -9,7 +9,7 @@
 
 use super::plane_map::{MIN_CORNERS, NetworkSettings, TrainingSet, errors_mm};
 use crate::adjust::observations::{ObservedCorner, ViewBlock};
-use crate::geometry::rms;
+use crate::numerics::rms;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 

@@ -1,11 +1,12 @@
 //! `detect`: from a dataset's images to labelled corners, with a verdict on every image.
 
-use crate::dataset::{Dataset, View};
+use crate::dataset::Dataset;
 use crate::detect::overlay::{OverlayError, write_all};
 use crate::detect::verdict::{ImageFigures, ImageVerdict, Outcome};
 use crate::detect::{
     DetectError, DetectSettings, Detection, PairCheck, TurnedImage, detect_dataset,
 };
+use crate::observed::View;
 use crate::progress::Progress;
 use clap::Args;
 use serde::Serialize;

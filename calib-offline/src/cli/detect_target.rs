@@ -2,12 +2,13 @@
 //! verdict on every image.
 
 use super::detect::DetectArgs;
-use crate::dataset::{Dataset, View};
+use crate::dataset::Dataset;
 use crate::detect::ring_target::{
     TargetDetection, TargetError, TargetFigures, TargetImage, TargetSettings, detect_target,
     overlay::write_all,
 };
 use crate::error::Error;
+use crate::observed::View;
 use crate::progress::Progress;
 use serde::Serialize;
 use std::fmt::Write as _;

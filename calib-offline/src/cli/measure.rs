@@ -9,10 +9,11 @@ use super::usage_error::UsageError;
 use crate::atomic_file::{PendingFile, WriteError};
 use crate::device::{DeviceSource, connect};
 use crate::error::Error;
-use crate::matches::source::{BlobSource, PointSource, RigSource};
 use crate::matches::{
-    MatchesError, MeasureSummary, POINTS_HEADER, StreamError, measure_batches, measure_stream,
+    BlobSource, MatchesError, MeasureSummary, POINTS_HEADER, StreamError, measure_batches,
+    measure_stream,
 };
+use crate::measure::{PointSource, RigSource};
 use crate::report::text::short;
 use clap::Args;
 use firmware_sim::client::DEFAULT_TIMEOUT;

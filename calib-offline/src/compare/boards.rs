@@ -3,12 +3,12 @@
 
 use crate::adjust::Observations;
 use crate::adjust::observations::{ObservedCorner, ViewBlock};
-use crate::dataset::Corner;
 use crate::evaluate::held_out::{BoardErrors, Fold, measure_boards};
 use crate::evaluate::resection::residuals_with_free_pose;
 use crate::field::Rig;
 use crate::geometry::PixelPoint;
-use crate::matches::source::RigSource;
+use crate::measure::RigSource;
+use crate::observed::Corner;
 use nalgebra::Vector2;
 
 /// Errors of one method on one board.

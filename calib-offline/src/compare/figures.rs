@@ -9,9 +9,11 @@ use crate::evaluate::Folds;
 use crate::evaluate::held_out::{BoardErrors, Fold};
 use crate::evaluate::known_points::{Points, beside_truth, compare_with_truth, measure};
 use crate::evaluate::reprojection::residuals;
-use crate::geometry::{RigidTransform, rms};
+use crate::geometry::RigidTransform;
 use crate::matches::KnownMatches;
-use crate::matches::source::RigSource;
+use crate::measure::PointSource;
+use crate::measure::RigSource;
+use crate::numerics::rms;
 
 /// Median distance of the boards' middles from the first camera, mm.
 pub(super) fn working_distance_mm(answer: &Answer, observations: &Observations) -> Option<f64> {

@@ -5,9 +5,10 @@ mod error;
 
 pub use error::CornersError;
 
-use super::{Corner, Dataset, View};
+use super::Dataset;
 use crate::atomic_file::{self, WriteError};
 use crate::geometry::PixelPoint;
+use crate::observed::{Corner, View};
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::Path;

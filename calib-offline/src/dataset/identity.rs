@@ -1,6 +1,7 @@
 //! A name for what went into a calibration: equal exactly when the facts are equal.
 
-use super::{Dataset, View};
+use super::Dataset;
+use crate::observed::View;
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
 
@@ -60,8 +61,9 @@ pub fn hex(bytes: &[u8]) -> String {
 mod tests {
     use super::*;
     use crate::board::BoardSpec;
-    use crate::dataset::{CameraSpec, Corner};
+    use crate::dataset::CameraSpec;
     use crate::geometry::{PixelPoint, SensorSize};
+    use crate::observed::Corner;
 
     #[test]
     fn every_fact_changes_it_and_the_folder_does_not() {

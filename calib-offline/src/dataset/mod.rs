@@ -17,7 +17,7 @@ pub use sufficiency::{SufficiencyError, check_sufficiency};
 pub use target::{TargetSpec, load_markers};
 
 use crate::board::BoardSpec;
-use crate::geometry::{PixelPoint, SensorSize};
+use crate::geometry::SensorSize;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
@@ -90,29 +90,4 @@ pub struct StageSpec {
     pub angles_deg: Option<Vec<f64>>,
     /// Stage placement per pose; poses of one placement share one axis.
     pub placement: Option<Vec<usize>>,
-}
-
-/// One labelled corner in one image.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Corner {
-    /// Row of the board, from 0.
-    pub row: usize,
-    /// Column of the board, from 0.
-    pub col: usize,
-    /// Where it was seen.
-    pub pixel: PixelPoint,
-    /// Standard deviation per axis, px, if the detector gave one.
-    pub sigma_px: Option<f64>,
-}
-
-/// The corners that one camera saw of one pose; at least one, in (row, col) order.
-#[derive(Debug, Clone, PartialEq)]
-pub struct View {
-    /// Index into [`Dataset::cameras`].
-    pub camera_idx: usize,
-    /// The pose's number in the dataset (image order, or the `pose` column of `corners.csv`).
-    /// Numbers need not be contiguous.
-    pub pose: usize,
-    /// The corners seen.
-    pub corners: Vec<Corner>,
 }

@@ -5,8 +5,9 @@
 //! smallest number. Which of the two holds follows from the length of the list; a list that fits
 //! neither is an error.
 
+use super::Dataset;
 use super::corners::{CornersError, poses};
-use super::{Dataset, View};
+use crate::observed::View;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What the stage says of one pose.

@@ -1,12 +1,9 @@
 //! Whether the corners could determine a calibration at all: cheap counts before any estimate.
 
+use super::Dataset;
 use super::corners::poses;
-use super::{Corner, Dataset, View};
+use crate::observed::{Corner, MIN_POSES, View};
 use crate::remedy::Remedy;
-
-/// Fewest poses of the board that determine a camera: with two, the focal length of a general
-/// view is fixed only if nothing else is unknown.
-pub const MIN_POSES: usize = 3;
 
 /// Corners of a view lie on a line if their scatter across it is below this share of the scatter
 /// along it. A board seen at 89 degrees still has a share of 1e-2.

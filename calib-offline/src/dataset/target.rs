@@ -3,8 +3,9 @@
 //! Target frame: origin at the center of the marker in row 0, column 0, x along the columns, y along
 //! the rows, z away from the printed face, mm.
 
-use super::{CornersError, Dataset, View, corners::read_corners};
+use super::{CornersError, Dataset, corners::read_corners};
 use crate::board::BoardSpec;
+use crate::observed::View;
 use nalgebra::Vector3;
 use std::path::PathBuf;
 

@@ -3,7 +3,8 @@
 
 use super::DemoError;
 use crate::device::on_wire;
-use crate::matches::{KnownMatches, Sighting};
+use crate::matches::KnownMatches;
+use crate::measure::Sighting;
 use crate::report::Calibration;
 use firmware_sim::client::{ClientError, DeviceClient, FlashOptions};
 use firmware_sim::host::SimulatedDevice;

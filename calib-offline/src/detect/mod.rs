@@ -26,9 +26,10 @@ pub mod verdict;
 mod tests;
 
 use crate::board::BoardSpec;
+use crate::dataset::Dataset;
 use crate::dataset::image::{GrayImage, ImageError};
-use crate::dataset::{Corner, Dataset, View};
 use crate::geometry::{PixelPoint, SensorSize};
+use crate::observed::{Corner, View};
 use crate::progress::Progress;
 use crate::remedy::Remedy;
 use border::Borders;

@@ -2,9 +2,10 @@
 
 use super::Detection;
 use super::verdict::{ImageVerdict, Outcome};
+use crate::dataset::Dataset;
 use crate::dataset::image::GrayImage;
-use crate::dataset::{Corner, Dataset, View};
 use crate::in_order;
+use crate::observed::{Corner, View};
 use crate::progress::Progress;
 use crate::remedy::Remedy;
 use image::{Rgb, RgbImage};

@@ -7,7 +7,9 @@
 
 use super::epipolar::{FundamentalMatrix, Match};
 use super::matches_of;
-use crate::dataset::{Corner, Dataset, View};
+use crate::dataset::Dataset;
+use crate::observed::Corner;
+use crate::observed::View;
 use crate::remedy::Remedy;
 use std::collections::BTreeMap;
 

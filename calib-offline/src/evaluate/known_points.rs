@@ -2,7 +2,8 @@
 //! that turns matches into points.
 
 use crate::geometry::best_placement;
-use crate::matches::{KnownMatches, PointSource, Sighting, TruePoint};
+use crate::matches::{KnownMatches, TruePoint};
+use crate::measure::{PointSource, Sighting};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde::Serialize;

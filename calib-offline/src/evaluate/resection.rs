@@ -2,10 +2,10 @@
 
 use crate::adjust::residual::linearize;
 use crate::board::{BoardShape, BoardSpec};
-use crate::dataset::Corner;
 use crate::field::RayField;
 use crate::geometry::so3::skew;
 use crate::init::bearing_pose::bearing_pose;
+use crate::observed::Corner;
 use nalgebra::{Matrix2x6, Matrix6, Vector2, Vector6};
 
 /// Gauss-Newton steps: the start is good to a pixel, convergence is quadratic.

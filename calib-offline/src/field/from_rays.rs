@@ -9,8 +9,8 @@
 use super::knot_order::KnotOrder;
 use super::spline::{Spline, SplineGrid};
 use super::{BaseLens, CoverageMask, RayField, SmoothMap, transport};
-use crate::geometry::banded::BandedSystem;
 use crate::geometry::{PixelPoint, Ray, SensorSize};
+use crate::numerics::banded_system::BandedSystem;
 use nalgebra::{Vector2, Vector3};
 
 /// A pixel, and the ray that it sees.

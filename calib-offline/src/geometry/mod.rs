@@ -3,12 +3,10 @@
 //! Lengths are millimeters, angles radians. `a_from_b` maps coordinates in frame b to coordinates
 //! in frame a, so products chain by eye: `left_from_datum * datum_from_board`.
 
-pub mod banded;
 pub mod hull;
 pub mod pixel;
 pub mod placement;
 pub mod ray;
-mod rms;
 pub mod se3;
 pub mod so3;
 pub mod triangulation;
@@ -16,7 +14,6 @@ pub mod triangulation;
 pub use pixel::{PixelPoint, SensorSize};
 pub use placement::best_placement;
 pub use ray::Ray;
-pub use rms::rms;
 pub use se3::RigidTransform;
 pub use triangulation::{
     TriangulateError, Triangulation, midpoint_by_shifts, nearest_point, triangulate_pair,

@@ -1,8 +1,8 @@
 //! One camera: which ideal lens is nearest, then a cubic field and a pose for every board.
 
-use super::bearing_pose::{bearing_pose, is_collinear};
+use super::bearing_pose::bearing_pose;
 use super::parallel_rays::affine_median_px;
-use super::{InitError, MIN_CORNERS, MIN_POSES};
+use super::{InitError, MIN_CORNERS, MIN_POSES, is_usable};
 use crate::adjust::levenberg::{self, Settings};
 use crate::adjust::objective;
 use crate::adjust::observations::ViewBlock;
@@ -99,12 +99,6 @@ pub fn start_camera(
         }),
         _ => Ok(start),
     }
-}
-
-/// Whether the view alone can place its board.
-pub fn is_usable(view: &ViewBlock) -> bool {
-    let points: Vec<_> = view.corners.iter().map(|c| c.point_in_board).collect();
-    points.len() >= MIN_CORNERS && !is_collinear(&points)
 }
 
 /// Poses evenly spread over those that show at least the median number of corners.

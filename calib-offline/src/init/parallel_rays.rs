@@ -1,6 +1,6 @@
 //! Whether boards look as if seen by parallel rays: then each image is an affine map of its board.
 
-use super::focal_scan::is_usable;
+use super::is_usable;
 use crate::adjust::Observations;
 use crate::adjust::observations::ViewBlock;
 use nalgebra::{Matrix3, Matrix3x2, Vector3};

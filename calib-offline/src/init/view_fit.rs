@@ -50,7 +50,7 @@ pub fn fit_view(
     shape: &BoardShape,
     view: &ViewBlock,
 ) -> Option<ViewFit> {
-    if !super::focal_scan::is_usable(view) {
+    if !super::is_usable(view) {
         return None;
     }
     let samples: Vec<_> = view.corners.iter().map(|c| field.sample(c.pixel)).collect();

@@ -1,7 +1,7 @@
 //! What the model is made of, chosen by the evidence: spline spacing, and per camera central or
 //! not. Every alternative that was tried is reported with its evidence.
 
-use super::estimate::EstimateError;
+use super::error::EstimateError;
 use super::evidence::Family;
 use super::fit::Fit;
 use super::rebase::rebase;

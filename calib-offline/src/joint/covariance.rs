@@ -1,6 +1,7 @@
 //! How well each ray is known after the estimate, and where the noise of a pixel takes it.
 
-use super::estimate::{Estimate, EstimateError};
+use super::error::EstimateError;
+use super::estimate::Estimate;
 use crate::adjust::covariance::{Sighting, sighting_covariance};
 use crate::field::uncertainty::{PairUncertainty, node_pixel, packed};
 use crate::field::{CalibratedCamera, Rig};

@@ -1,6 +1,7 @@
 //! The estimate from start to end.
 
 use super::choice::{self, Candidate, Choice};
+use super::error::EstimateError;
 use super::evidence::{Smoothness, SmoothnessFound};
 use super::fit::Fit;
 use super::rebase::rebase;
@@ -58,20 +59,6 @@ pub struct Estimate {
     pub stop: StopReason,
     /// The fit behind it all.
     pub(super) fit: Fit,
-}
-
-/// Why there is no estimate.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum EstimateError {
-    /// The normal equations are singular.
-    #[error("the corners do not determine the cameras: {free} parameters, {corner_count} corners")]
-    Singular {
-        /// Number of global parameters.
-        free: usize,
-        /// Number of corners.
-        corner_count: usize,
-    },
 }
 
 /// Estimates everything from a start.

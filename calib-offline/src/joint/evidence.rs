@@ -1,13 +1,12 @@
 //! How strongly smoothness holds, from the data themselves (METHOD 2.4, 9A).
 
-use super::fit::Fit;
-use crate::adjust::banded::BandedMatrix;
 use crate::adjust::knots::{thin_plate, thin_plate_ln_determinant};
 use crate::adjust::model::Layout;
 use crate::adjust::priors::{CameraPriors, Priors};
 use crate::adjust::reduced::Reduced;
 use crate::adjust::{CameraModel, Model};
 use crate::field::knot_order::KnotOrder;
+use crate::numerics::banded::BandedMatrix;
 use nalgebra::DVector;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -365,15 +364,4 @@ fn probes(len: usize) -> Vec<DVector<f64>> {
             })
         })
         .collect()
-}
-
-impl Fit {
-    /// Twice the logarithm of the evidence, up to a constant that all models of the same data
-    /// share (METHOD 2.4): likelihood of the residuals under their own distribution, with the
-    /// effective number of corners, plus priors, minus what the parameters could have been.
-    pub fn ln_evidence_twice(&self, reduced: &Reduced, priors: &Priors) -> f64 {
-        self.share * 2.0 * self.log_likelihood() - priors.cost(&self.model)
-            + self.smoothness.ln_prior_determinant(&self.model)
-            - reduced.ln_determinant()
-    }
 }

@@ -1,7 +1,7 @@
 //! A fit in progress: a model, its smoothness weights and its noise, taken forward in rounds.
 
 use super::correlation::{effective_share, neighbor_correlation};
-use super::estimate::EstimateError;
+use super::error::EstimateError;
 use super::evidence::Smoothness;
 use crate::adjust::levenberg::{self, Settings, StopReason};
 use crate::adjust::model::Layout;
@@ -243,5 +243,14 @@ impl Fit {
             neighbor_correlation(&self.residuals, observations, &self.noise).unwrap_or(0.0);
         self.share = effective_share(correlation);
         correlation
+    }
+
+    /// Twice the logarithm of the evidence, up to a constant that all models of the same data
+    /// share (METHOD 2.4): likelihood of the residuals under their own distribution, with the
+    /// effective number of corners, plus priors, minus what the parameters could have been.
+    pub fn ln_evidence_twice(&self, reduced: &Reduced, priors: &Priors) -> f64 {
+        self.share * 2.0 * self.log_likelihood() - priors.cost(&self.model)
+            + self.smoothness.ln_prior_determinant(&self.model)
+            - reduced.ln_determinant()
     }
 }

@@ -5,6 +5,7 @@ pub mod calibrated;
 pub mod choice;
 pub mod correlation;
 pub mod covariance;
+mod error;
 pub mod estimate;
 pub mod evidence;
 pub mod fit;
@@ -14,6 +15,7 @@ pub mod recheck;
 pub mod refit;
 
 pub use choice::{Alternative, Choice};
-pub use estimate::{Estimate, EstimateError, estimate};
+pub use error::EstimateError;
+pub use estimate::{Estimate, estimate};
 pub use evidence::{Family, SmoothnessFound};
 pub use recheck::estimate_screened;

@@ -2,7 +2,8 @@
 //! bundle of rays, for a camera alone.
 
 use super::covariance::{RIGID_RANK_SHARE, node, points_by_predictions};
-use super::estimate::{Estimate, EstimateError};
+use super::error::EstimateError;
+use super::estimate::Estimate;
 use crate::adjust::covariance::sighting_covariance;
 use crate::field::{Rig, transport};
 use crate::geometry::PixelPoint;

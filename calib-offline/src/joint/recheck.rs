@@ -1,7 +1,8 @@
 //! Views judged once more when the fields are known well: at the start a cubic field hides what is
 //! small, and can make a good view look bad.
 
-use super::estimate::{Estimate, EstimateError, estimate};
+use super::error::EstimateError;
+use super::estimate::{Estimate, estimate};
 use crate::adjust::Observations;
 use crate::field::RayField;
 use crate::init::pair_consensus::FINE_LIMIT_SIGMA;

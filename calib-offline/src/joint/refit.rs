@@ -2,7 +2,8 @@
 //! the start is good and the choice of the model is kept.
 
 use super::choice::Candidate;
-use super::estimate::{Estimate, EstimateError, LAST, finish};
+use super::error::EstimateError;
+use super::estimate::{Estimate, LAST, finish};
 use super::fit::Fit;
 use crate::adjust::{Model, Observations};
 use crate::board::BoardShape;

@@ -1,7 +1,8 @@
 //! Matches of a simulated dataset with their truth beside them.
 
-use super::source::{Number, Sighting};
 use super::{MatchesError, read_matches};
+use crate::measure::Number;
+use crate::measure::Sighting;
 use nalgebra::Vector3;
 use serde::Deserialize;
 use std::path::Path;

@@ -2,8 +2,8 @@
 
 use super::error::MatchesError;
 use super::row;
-use super::source::{Number, Sighting};
 use super::stream::parse_header;
+use crate::measure::{Number, Sighting};
 use std::path::Path;
 
 /// Reads all matches, one list of sightings each, in the file's order.

@@ -4,19 +4,19 @@
 //! row in the output, in the input's order. Files of any length go through in blocks, so that
 //! memory does not grow with them.
 
+pub mod blob_source;
 mod error;
 mod header;
 pub mod known;
 mod list;
 mod row;
-pub mod source;
 mod stream;
 
+pub use blob_source::BlobSource;
 pub use error::MatchesError;
 pub use header::Columns;
 pub use known::{KnownMatches, TruePoint, read_known};
 pub use list::read_matches;
-pub use source::{BatchSource, Number, PointSource, Sighting, Status};
 pub use stream::{MeasureSummary, StreamError, measure_batches, measure_stream};
 
 /// The header of `POINTS.csv`.

@@ -2,7 +2,7 @@
 
 use super::error::{RowProblem, shortened};
 use super::header::Columns;
-use super::source::{Number, Point, Sighting, Status};
+use crate::measure::{Number, Point, Sighting, Status};
 
 /// Reads a row into `sightings` (cleared first) and returns its id as it stands there.
 pub(super) fn parse<'a, N: Number>(

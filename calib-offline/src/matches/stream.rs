@@ -5,7 +5,7 @@ use super::POINTS_HEADER;
 use super::error::{MatchesError, RowProblem, shortened};
 use super::header::Columns;
 use super::row;
-use super::source::{BatchSource, Number, Point, PointSource, Sighting, Status};
+use crate::measure::{BatchSource, Number, Point, PointSource, Sighting, Status};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::convert::Infallible;

@@ -12,7 +12,7 @@ use crate::evaluate::reprojection::residuals;
 use crate::field::{BaseLens, MeasureError, RayTable, Rig};
 use crate::geometry::{PixelPoint, Ray, SensorSize, triangulate_pair, triangulate_rays};
 use crate::init::rig::{RigStart, start_rig};
-use crate::matches::source::{Point, PointSource, Sighting, Status};
+use crate::measure::{Point, PointSource, Sighting, Status};
 use crate::progress::Progress;
 use crate::report::record::AlternatingRecord;
 use nalgebra::Vector2;

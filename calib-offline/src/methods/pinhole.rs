@@ -7,7 +7,7 @@ use crate::board::BoardShape;
 use crate::evaluate::held_out::Estimated;
 use crate::evaluate::reprojection::residuals;
 use crate::geometry::{PixelPoint, RigidTransform};
-use crate::matches::source::{Point, PointSource, Sighting, Status};
+use crate::measure::{Point, PointSource, Sighting, Status};
 use crate::pinhole::{Loss, PinholeRig, RigSettings, Settings, calibrate_rig};
 use crate::progress::Progress;
 

@@ -8,7 +8,7 @@ use crate::evaluate::known_points::{Points, measure};
 use crate::field::{RayTable, Rig};
 use crate::geometry::{RigidTransform, SensorSize};
 use crate::init::screening::Finding;
-use crate::matches::source::{PointSource, RigSource, Sighting};
+use crate::measure::{PointSource, RigSource, Sighting};
 use crate::report::record::{AlternatingRecord, ChoicesRecord};
 use nalgebra::Vector2;
 use std::collections::BTreeSet;

@@ -7,7 +7,7 @@ use crate::field::CalibratedCamera;
 use crate::field::knot_order::KnotOrder;
 use crate::field::spline::SplineGrid;
 use crate::geometry::PixelPoint;
-use crate::geometry::banded::BandedSystem;
+use crate::numerics::banded_system::BandedSystem;
 use ray_runtime::format::{PLACES_PER_CELL, places_per_px};
 
 /// Knots of a uniform bicubic B-spline whose cells cover the sensor from outer edge to outer edge.

@@ -3,8 +3,9 @@
 use super::*;
 use crate::field::spline::{Spline, SplineGrid};
 use crate::field::{BaseLens, CalibratedCamera, CoverageMask, Projection, RayField, SmoothMap};
-use crate::geometry::{RigidTransform, SensorSize, so3};
+use crate::geometry::{PixelPoint, RigidTransform, SensorSize, so3};
 use nalgebra::{Vector2, Vector3};
+use ray_runtime::OpenError;
 
 const SENSOR: SensorSize = SensorSize::new(1280, 1024);
 

@@ -4,7 +4,7 @@
 use crate::adjust::observations::ViewBlock;
 use crate::geometry::{PixelPoint, RigidTransform, SensorSize};
 use crate::init::bearing_pose::BoardHomography;
-use crate::init::focal_scan::is_usable;
+use crate::init::is_usable;
 use nalgebra::{Matrix3, Vector3};
 
 /// `z (u, v, 1)^T = H (X, Y, 1)^T` for a view of a flat board.

@@ -1,13 +1,13 @@
 //! Reprojection errors of Brown cameras, their cost, and the equations for a step.
 
 use super::PinholeError;
-use super::arrowhead::{Arrowhead, Step};
 use super::brown::{BrownCamera, INTRINSICS};
 use crate::adjust::Observations;
 use crate::adjust::objective::Weights;
 use crate::adjust::observations::ViewBlock;
 use crate::geometry::so3::skew;
 use crate::geometry::{PixelPoint, RigidTransform};
+use crate::numerics::arrowhead::{Arrowhead, Step};
 use nalgebra::{DMatrix, Vector2, Vector3};
 
 /// Cameras, where they stand, and where the boards are.

@@ -7,8 +7,8 @@ use crate::dataset::stage;
 use crate::evaluate::half_data::HalfDataCheck;
 use crate::evaluate::verdict::{Figures, judge};
 use crate::evaluate::{CrossChecks, HeldOut, fit_stage_axes};
-use crate::geometry::rms;
 use crate::methods::solution::Solution;
+use crate::numerics::rms;
 use crate::report::record::{
     Calibration, CornerRecord, EstimateRecord, HeldOutRecord, PoseRecord, SCHEMA, StageAxis,
 };

@@ -1,10 +1,12 @@
 //! The images of a simulated dataset.
 
-use super::output::{ImageDepth, SimulateError, Writer};
+use super::error::SimulateError;
 use super::render::{RenderSettings, Rendered};
 use super::scene::Scene;
+use super::settings::ImageDepth;
 use super::tables::{marker_table, match_table};
 use super::target;
+use super::writer::Writer;
 use crate::in_order;
 use std::path::Path;
 

@@ -8,6 +8,7 @@
 //! Shares `geometry`, `board` and the corner types of `dataset` with the estimator, and nothing
 //! else: a mistake in the ray field cannot hide in both.
 
+mod error;
 mod images;
 pub mod matches;
 mod observe;
@@ -22,14 +23,16 @@ pub mod settings;
 pub mod stage;
 mod tables;
 pub mod target;
+mod writer;
 
+pub use error::SimulateError;
 pub use matches::{MatchSet, TrueMatch};
 pub use optics::CameraOptics;
-pub use output::{ImageDepth, OutputSettings, SimulateError, SimulateSummary, write_dataset};
+pub use output::{SimulateSummary, write_dataset};
 pub use preset::OpticsKind;
 pub use render::RenderSettings;
 pub use scene::Scene;
-pub use settings::{SceneError, SceneSettings};
+pub use settings::{ImageDepth, OutputSettings, SceneError, SceneSettings};
 
 #[cfg(test)]
 mod output_tests;

@@ -2,8 +2,8 @@
 
 use super::random::{self, Purpose};
 use super::scene::Scene;
-use crate::dataset::{Corner, View};
 use crate::geometry::PixelPoint;
+use crate::observed::{Corner, View};
 use rand_distr::{ChiSquared, Distribution};
 
 impl Scene {

@@ -16,57 +16,16 @@
 //! measure; `board,row,col` which corner it was, for held-out boards. Millimeters; numbers are
 //! written so that reading them gives the same bits.
 
+use super::error::SimulateError;
 use super::images::{write_board_images, write_target};
 use super::matches::{MatchSet, TrueMatch};
-use super::render::RenderSettings;
 use super::scene::Scene;
-use super::settings::SceneError;
+use super::settings::OutputSettings;
 use super::tables::{corner_table, manifest, match_table, truth, truth_table};
+use super::writer::Writer;
 use crate::remedy::Remedy;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-
-/// What to write.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OutputSettings {
-    /// Observed corners.
-    pub corners: bool,
-    /// Images of the board.
-    pub images: bool,
-    /// Images of the ring target.
-    pub ring_target: bool,
-    /// How images look.
-    pub render: RenderSettings,
-    /// 8 or 16 bits per pixel.
-    pub image_depth: ImageDepth,
-    /// How many matches inside the swept volume.
-    pub point_count: usize,
-    /// How many held-out corners.
-    pub holdout_count: usize,
-}
-
-impl Default for OutputSettings {
-    fn default() -> Self {
-        Self {
-            corners: true,
-            images: false,
-            ring_target: false,
-            render: RenderSettings::default(),
-            image_depth: ImageDepth::Eight,
-            point_count: 500,
-            holdout_count: 500,
-        }
-    }
-}
-
-/// Bits per pixel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ImageDepth {
-    /// 8 bits.
-    Eight,
-    /// 16 bits.
-    Sixteen,
-}
 
 /// What was written.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -97,67 +56,6 @@ pub struct SimulateSummary {
     pub hull_share: Vec<f64>,
     /// Bytes of all files together.
     pub byte_count: u64,
-}
-
-/// Why a dataset could not be simulated.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SimulateError {
-    /// The settings make no scene.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The output path is a file.
-    #[error("{}: the output must be a folder, and this is a file", .path.display())]
-    OutputIsFile {
-        /// The path given.
-        path: PathBuf,
-    },
-    /// The output folder holds something.
-    #[error("{}: the folder is not empty; --force replaces it with everything in it", .path.display())]
-    OutputNotEmpty {
-        /// The path given.
-        path: PathBuf,
-    },
-    /// An argument cannot be read.
-    #[error("{option} {text:?}: expected {expected}")]
-    Argument {
-        /// The option.
-        option: &'static str,
-        /// What was given.
-        text: String,
-        /// What would be right.
-        expected: &'static str,
-    },
-    /// No point of the swept volume is seen by all cameras.
-    #[error("only {have} of {need} matches found: the cameras hardly see the board together")]
-    TooFewMatches {
-        /// How many were asked for.
-        need: usize,
-        /// How many there are.
-        have: usize,
-    },
-    /// Reading or writing a file.
-    #[error("{}: {source}", .path.display())]
-    Io {
-        /// Which.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// Encoding an image.
-    #[error("{}: {source}", .path.display())]
-    Image {
-        /// Which.
-        path: PathBuf,
-        /// Why.
-        source: image::ImageError,
-    },
-}
-
-impl Remedy for SimulateError {
-    fn remedy(&self) -> Option<String> {
-        Some("see calib-offline simulate --help".to_owned())
-    }
 }
 
 /// Simulates into `folder`, which appears whole or not at all.
@@ -311,24 +209,4 @@ pub fn oracle_rms_mm(matches: &[TrueMatch]) -> f64 {
         .map(|entry| (entry.oracle_in_datum - entry.point_in_datum).norm_squared())
         .sum();
     (sum / matches.len().max(1) as f64).sqrt()
-}
-
-/// Writes files into one folder and counts their bytes.
-pub(super) struct Writer {
-    pub folder: PathBuf,
-    pub byte_count: u64,
-}
-
-impl Writer {
-    pub fn text(&mut self, name: &str, text: &str) -> Result<(), SimulateError> {
-        let path = self.folder.join(name);
-        std::fs::write(&path, text).map_err(|source| SimulateError::Io { path, source })?;
-        self.byte_count += text.len() as u64;
-        Ok(())
-    }
-
-    pub fn subfolder(&self, name: &str) -> Result<(), SimulateError> {
-        let path = self.folder.join(name);
-        std::fs::create_dir_all(&path).map_err(|source| SimulateError::Io { path, source })
-    }
 }

@@ -1,6 +1,7 @@
 //! What to simulate.
 
 use super::preset::OpticsKind;
+use super::render::RenderSettings;
 use crate::board::BoardSpec;
 use crate::geometry::SensorSize;
 use serde::{Deserialize, Serialize};
@@ -171,4 +172,46 @@ pub enum SceneError {
         /// The most allowed.
         high: f64,
     },
+}
+
+/// What to write.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OutputSettings {
+    /// Observed corners.
+    pub corners: bool,
+    /// Images of the board.
+    pub images: bool,
+    /// Images of the ring target.
+    pub ring_target: bool,
+    /// How images look.
+    pub render: RenderSettings,
+    /// 8 or 16 bits per pixel.
+    pub image_depth: ImageDepth,
+    /// How many matches inside the swept volume.
+    pub point_count: usize,
+    /// How many held-out corners.
+    pub holdout_count: usize,
+}
+
+impl Default for OutputSettings {
+    fn default() -> Self {
+        Self {
+            corners: true,
+            images: false,
+            ring_target: false,
+            render: RenderSettings::default(),
+            image_depth: ImageDepth::Eight,
+            point_count: 500,
+            holdout_count: 500,
+        }
+    }
+}
+
+/// Bits per pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ImageDepth {
+    /// 8 bits.
+    Eight,
+    /// 16 bits.
+    Sixteen,
 }

@@ -1,14 +1,14 @@
 //! The text files of a simulated dataset: manifest, tables and truth.
 
 use super::matches::TrueMatch;
-use super::output::OutputSettings;
 use super::pattern::{
     DIRECTION_MARKERS, DIRECTION_RADII_MM, RING_COLS, RING_PITCH_MM, RING_RADII_MM, RING_ROWS,
 };
 use super::scene::Scene;
+use super::settings::OutputSettings;
 use super::target::SeenMarker;
-use crate::dataset::View;
 use crate::geometry::PixelPoint;
+use crate::observed::View;
 use serde_json::json;
 use std::fmt::Write as _;
 

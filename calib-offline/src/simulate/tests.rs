@@ -2,8 +2,8 @@
 
 use super::output::oracle_rms_mm;
 use super::*;
-use crate::dataset::{Corner, View};
 use crate::geometry::{SensorSize, so3, triangulate_rays};
+use crate::observed::{Corner, View};
 
 fn scene(settings: SceneSettings) -> Scene {
     Scene::new(settings).unwrap()

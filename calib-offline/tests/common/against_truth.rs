@@ -2,13 +2,13 @@
 
 use calib_offline::adjust::Observations;
 use calib_offline::board::BoardSpec;
-use calib_offline::dataset::View;
 use calib_offline::evaluate::known_points::{PointWithTruth, TruthErrors, compare_with_truth};
 use calib_offline::geometry::{PixelPoint, RigidTransform, best_placement, so3};
 use calib_offline::init::rig::start_rig;
 use calib_offline::init::screening::{Finding, FindingKind};
 use calib_offline::joint::{Estimate, estimate_screened};
-use calib_offline::matches::source::{PointSource, RigSource};
+use calib_offline::measure::{PointSource, RigSource};
+use calib_offline::observed::View;
 use calib_offline::simulate::{
     CameraOptics, MatchSet, OpticsKind, Scene, SceneSettings, TrueMatch,
 };

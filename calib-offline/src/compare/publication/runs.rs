@@ -3,7 +3,7 @@
 use super::MethodOutcome;
 use crate::evaluate::known_points::Points;
 use crate::geometry::RigidTransform;
-use crate::matches::Sighting;
+use crate::measure::Sighting;
 use crate::methods::{Given, METHODS, MethodError, Solution};
 use crate::progress::Silent;
 use nalgebra::Vector3;

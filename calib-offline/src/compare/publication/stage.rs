@@ -3,7 +3,9 @@
 use super::runs::{InDatum, MethodRun, solved};
 use crate::dataset::stage::StageEntry;
 use crate::evaluate::fit_stage_axes;
-use crate::geometry::{RigidTransform, rms, so3};
+use crate::geometry::RigidTransform;
+use crate::geometry::so3;
+use crate::numerics::rms;
 use nalgebra::Vector3;
 use serde::Serialize;
 

@@ -10,8 +10,9 @@ use crate::detect::ring_target::{
     MarkerMatch, TargetError, TargetSettings, join_markers, target_views,
 };
 use crate::evaluate::measured_board::MeasuredBoard;
-use crate::geometry::{best_placement, rms};
-use crate::matches::Sighting;
+use crate::geometry::best_placement;
+use crate::measure::Sighting;
+use crate::numerics::rms;
 use crate::progress::Progress;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

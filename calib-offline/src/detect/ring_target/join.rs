@@ -1,7 +1,8 @@
 //! One marker in all cameras: pixels that belong together.
 
-use crate::dataset::{TargetSpec, View};
+use crate::dataset::TargetSpec;
 use crate::geometry::PixelPoint;
+use crate::observed::View;
 use std::collections::BTreeMap;
 
 /// A marker that every camera saw.
@@ -49,7 +50,7 @@ pub fn join_markers(target: &TargetSpec, views: &[View], camera_count: usize) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::Corner;
+    use crate::observed::Corner;
 
     #[test]
     fn only_markers_that_all_cameras_saw_are_joined() {

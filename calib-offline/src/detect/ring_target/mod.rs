@@ -27,7 +27,8 @@ pub use verdict::{TargetFigures, TargetImage, TargetRefusal};
 
 use super::{DetectError, Job, all_loaded};
 use crate::dataset::image::GrayImage;
-use crate::dataset::{Corner, CornersError, Dataset, TargetSpec, View, load_markers};
+use crate::dataset::{CornersError, Dataset, TargetSpec, load_markers};
+use crate::observed::{Corner, View};
 use crate::progress::Progress;
 use crate::remedy::Remedy;
 use rayon::prelude::*;

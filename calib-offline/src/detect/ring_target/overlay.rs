@@ -1,9 +1,10 @@
 //! The images of the target with what was found in them drawn over.
 
 use super::{Located, TargetDetection};
+use crate::dataset::Dataset;
 use crate::dataset::image::GrayImage;
-use crate::dataset::{Corner, Dataset};
 use crate::detect::overlay::{Canvas, OverlayError, save_all};
+use crate::observed::Corner;
 use crate::progress::Progress;
 use nalgebra::Vector2;
 use std::path::Path;

@@ -1,5 +1,6 @@
 use super::*;
-use crate::matches::source::{Point, Sighting};
+use crate::measure::Point;
+use crate::measure::Sighting;
 use crate::remedy::Remedy as _;
 use std::fmt::Write as _;
 

@@ -1,4 +1,4 @@
-//! The mean by which errors are told.
+//! The figures by which many values are told.
 
 /// Root mean square; `None` of nothing.
 pub fn rms(values: &[f64]) -> Option<f64> {

@@ -2,10 +2,11 @@
 //! corners were seen, and which shot to add.
 
 use crate::dataset::corners::poses;
-use crate::dataset::{Corner, Dataset, View, check_sufficiency};
+use crate::dataset::{Dataset, check_sufficiency};
 use crate::detect::suspicion::turns_like_image;
 use crate::field::CoverageMask;
 use crate::geometry::{PixelPoint, SensorSize};
+use crate::observed::{Corner, View};
 use serde::Serialize;
 
 /// Fewer poses than this leave little to hold out.
