@@ -11,23 +11,23 @@ mod summary;
 
 pub use error::{CalibrateError, NoSuchPose};
 
-use crate::adjust::Observations;
-use crate::dataset::Dataset;
-use crate::dataset::corners::load_corners;
-use crate::dataset::split::without_excluded;
-use crate::dataset::stage::placements;
-use crate::dataset::sufficiency::{SufficiencyError, check_sufficiency};
-use crate::detect::suspicion::suspicious_labels;
-use crate::detect::verdict::Outcome;
-use crate::detect::{self, DetectSettings};
+use calib_estimate::adjust::Observations;
+use calib_recording::dataset::Dataset;
+use calib_recording::dataset::corners::load_corners;
+use calib_recording::dataset::split::without_excluded;
+use calib_recording::dataset::stage::placements;
+use calib_recording::dataset::sufficiency::{SufficiencyError, check_sufficiency};
+use calib_recording::detect::suspicion::suspicious_labels;
+use calib_recording::detect::verdict::Outcome;
+use calib_recording::detect::{self, DetectSettings};
 use crate::evaluate::half_data::first_half;
 use crate::evaluate::held_out::folds_wanted;
 use crate::evaluate::verdict::Thresholds;
 use crate::evaluate::{Folds, held_out};
-use crate::field::RayTable;
+use calib_rays::field::RayTable;
 use crate::methods::{Given, Joint, Method, MethodError, Own, fit_folds};
-use crate::observed::View;
-use crate::progress::Progress;
+use calib_rays::observed::View;
+use calib_rays::progress::Progress;
 use crate::report::Calibration;
 use parts::Parts;
 

@@ -2,14 +2,14 @@
 
 mod common;
 
-use calib_offline::adjust::Observations;
+use calib_estimate::adjust::Observations;
 use calib_offline::compare::{compare_methods, words};
-use calib_offline::dataset::Dataset;
-use calib_offline::detect::DetectSettings;
+use calib_recording::dataset::Dataset;
+use calib_recording::detect::DetectSettings;
 use calib_offline::evaluate::held_out::Estimated;
 use calib_offline::methods::{Given, Joint, Method, MethodError, Pinhole, Solution};
 use calib_offline::pipeline;
-use calib_offline::progress::{Progress, Silent};
+use calib_rays::progress::{Progress, Silent};
 use common::{MANIFEST, contents, corners_csv, dataset, run};
 use serde_json::Value;
 use std::fs;

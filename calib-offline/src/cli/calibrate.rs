@@ -3,13 +3,13 @@
 use super::Outcome;
 use super::output::Console;
 use super::place::check_results_folder;
-use crate::atomic_file::{make_folder, write_set};
-use crate::dataset::Dataset;
+use calib_recording::atomic_file::{make_folder, write_set};
+use calib_recording::dataset::Dataset;
 use crate::error::Error;
 use crate::methods::{self, Method};
-use crate::pack::{PackSettings, pack_nearest};
+use calib_blob::pack::{PackSettings, pack_nearest};
 use crate::pipeline::{CalibrateError, CalibrateSettings, Calibrated};
-use crate::progress::Progress;
+use calib_rays::progress::Progress;
 use crate::report::facts::Facts;
 use crate::report::record::Grade;
 use crate::report::{BlobFacts, Calibration, html, text};

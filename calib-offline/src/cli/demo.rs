@@ -4,9 +4,9 @@ use super::Outcome;
 use super::calibrate::{FILES, Written, pack_settings, say_what_is_used, write_results};
 use super::output::Console;
 use super::usage_error::UsageError;
-use crate::adjust::Observations;
-use crate::atomic_file::{self, check_folder};
-use crate::dataset::Dataset;
+use calib_estimate::adjust::Observations;
+use calib_recording::atomic_file::{self, check_folder};
+use calib_recording::dataset::Dataset;
 use crate::demo::device::{check_cortex_m, check_simulated, corner_pairs, known_pairs};
 use crate::demo::page::{Entry, page};
 use crate::demo::unseen::measure_unseen;
@@ -14,9 +14,9 @@ use crate::demo::{DemoError, DeviceCheck, Measured, words};
 use crate::error::Error;
 use crate::evaluate::Folds;
 use crate::evaluate::known_points::KnownPoints;
-use crate::matches::{BlobSource, read_known};
-use crate::measure::PointSource;
-use crate::pack::{AlignedBytes, BlobError};
+use calib_blob::matches::{BlobSource, read_known};
+use calib_rays::measure::PointSource;
+use calib_blob::pack::{AlignedBytes, BlobError};
 use crate::pipeline::{self, CalibrateSettings, Checked};
 use crate::report::facts::Facts;
 use crate::report::record::Grade;
@@ -205,7 +205,7 @@ fn measure(
 }
 
 fn read(file: &Path) -> Result<AlignedBytes, Error> {
-    crate::pack::read_aligned(file).map_err(|source| {
+    calib_blob::pack::read_aligned(file).map_err(|source| {
         Error::Blob(BlobError::Read {
             file: file.to_owned(),
             source,

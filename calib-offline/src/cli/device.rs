@@ -3,7 +3,7 @@
 use super::Outcome;
 use super::output::Console;
 use super::usage_error::UsageError;
-use crate::dataset::identity::hex;
+use calib_recording::dataset::identity::hex;
 use crate::device::{DeviceError, DeviceState, connect, state_in_words};
 use crate::error::Error;
 use clap::{Args, Subcommand};

@@ -2,7 +2,7 @@
 
 use super::Outcome;
 use super::output::Console;
-use crate::atomic_file::{check_folder, check_writable, make_folder, write_set};
+use calib_recording::atomic_file::{check_folder, check_writable, make_folder, write_set};
 use crate::compare::publication::figures::figures;
 use crate::compare::publication::paper::evaluate_set_up;
 use crate::compare::publication::tables::tables;
@@ -10,7 +10,7 @@ use crate::compare::publication::words::{
     COMPARABLE, PUBLISHED_DEVIATION_MM, PUBLISHED_MEAN_MM, text,
 };
 use crate::compare::publication::{Evaluation, ExperimentSettings, evaluate};
-use crate::dataset::Dataset;
+use calib_recording::dataset::Dataset;
 use crate::error::Error;
 use clap::Args;
 use serde::Serialize;

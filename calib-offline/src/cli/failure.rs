@@ -3,7 +3,7 @@
 use super::output::{Console, Paint};
 use super::settings::{Narration, Settings};
 use crate::error::Error;
-use crate::remedy::Remedy;
+use calib_rays::remedy::Remedy;
 use serde::Serialize;
 use std::error::Error as _;
 use std::ffi::OsString;

@@ -6,14 +6,14 @@ use super::output::Console;
 use super::place::check_file;
 use super::rig_file::{RigFile, open};
 use super::usage_error::UsageError;
-use crate::atomic_file::{PendingFile, WriteError};
+use calib_recording::atomic_file::{PendingFile, WriteError};
 use crate::device::{DeviceSource, connect};
 use crate::error::Error;
-use crate::matches::{
+use calib_blob::matches::{
     BlobSource, MatchesError, MeasureSummary, POINTS_HEADER, StreamError, measure_batches,
     measure_stream,
 };
-use crate::measure::{PointSource, RigSource};
+use calib_rays::measure::{PointSource, RigSource};
 use crate::report::text::short;
 use clap::Args;
 use firmware_sim::client::DEFAULT_TIMEOUT;

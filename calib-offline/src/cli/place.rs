@@ -5,7 +5,7 @@
 //! calibration is not cheap, so its folder must not hold one.
 
 use super::usage_error::UsageError;
-use crate::atomic_file::{check_place, check_writable};
+use calib_recording::atomic_file::{check_place, check_writable};
 use crate::error::Error;
 use std::fs::File;
 use std::io::Read;

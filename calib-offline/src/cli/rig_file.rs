@@ -2,7 +2,7 @@
 
 use super::usage_error::UsageError;
 use crate::error::Error;
-use crate::pack::{AlignedBytes, BlobError};
+use calib_blob::pack::{AlignedBytes, BlobError};
 use crate::report::Calibration;
 use ray_runtime::RayBlob;
 use ray_runtime::format::MAGIC;

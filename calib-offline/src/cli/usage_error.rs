@@ -1,7 +1,7 @@
 //! Requests that cannot be met.
 
 use crate::pipeline::NoSuchPose;
-use crate::remedy::Remedy;
+use calib_rays::remedy::Remedy;
 use std::path::PathBuf;
 
 /// A request that cannot be met.

@@ -1,8 +1,8 @@
 //! Why methods cannot be compared.
 
-use crate::matches::MatchesError;
+use calib_blob::matches::MatchesError;
 use crate::pipeline::CalibrateError;
-use crate::remedy::Remedy;
+use calib_rays::remedy::Remedy;
 
 /// Why methods cannot be compared.
 #[derive(Debug, thiserror::Error)]

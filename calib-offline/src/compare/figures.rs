@@ -4,16 +4,16 @@ use super::answer::Answer;
 use super::boards::{BoardScore, FoldScores, score_fold};
 use super::record::{HeldOutFigures, MethodFigures, Ratios, Training, TruthFigures};
 use super::{Run, bootstrap};
-use crate::adjust::Observations;
+use calib_estimate::adjust::Observations;
 use crate::evaluate::Folds;
 use crate::evaluate::held_out::{BoardErrors, Fold};
 use crate::evaluate::known_points::{Points, beside_truth, compare_with_truth, measure};
-use crate::evaluate::reprojection::residuals;
-use crate::geometry::RigidTransform;
-use crate::matches::KnownMatches;
-use crate::measure::PointSource;
-use crate::measure::RigSource;
-use crate::numerics::rms;
+use calib_estimate::reprojection::residuals;
+use calib_rays::geometry::RigidTransform;
+use calib_blob::matches::KnownMatches;
+use calib_rays::measure::PointSource;
+use calib_rays::measure::RigSource;
+use calib_rays::numerics::rms;
 
 /// Median distance of the boards' middles from the first camera, mm.
 pub(super) fn working_distance_mm(answer: &Answer, observations: &Observations) -> Option<f64> {

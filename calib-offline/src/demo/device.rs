@@ -3,8 +3,8 @@
 
 use super::DemoError;
 use crate::device::on_wire;
-use crate::matches::KnownMatches;
-use crate::measure::Sighting;
+use calib_blob::matches::KnownMatches;
+use calib_rays::measure::Sighting;
 use crate::report::Calibration;
 use firmware_sim::client::{ClientError, DeviceClient, FlashOptions};
 use firmware_sim::host::SimulatedDevice;

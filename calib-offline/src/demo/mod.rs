@@ -8,8 +8,8 @@ pub mod unseen;
 pub mod words;
 
 use crate::evaluate::known_points::KnownPoints;
-use crate::pack::PackError;
-use crate::remedy::Remedy;
+use calib_blob::pack::PackError;
+use calib_rays::remedy::Remedy;
 use firmware_sim::client::ClientError;
 use ray_runtime::OpenError;
 use serde::Serialize;

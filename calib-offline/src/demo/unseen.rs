@@ -1,13 +1,13 @@
 //! Boards that the calibration never saw, measured by the device's code through a blob.
 
 use super::DemoError;
-use crate::adjust::Observations;
+use calib_estimate::adjust::Observations;
 use crate::evaluate::Folds;
 use crate::evaluate::held_out::{BoardErrors, Fold, measure_boards};
-use crate::in_order;
-use crate::matches::BlobSource;
-use crate::numerics::rms;
-use crate::pack::{AlignedBytes, PackSettings, pack_nearest};
+use calib_rays::in_order;
+use calib_blob::matches::BlobSource;
+use calib_rays::numerics::rms;
+use calib_blob::pack::{AlignedBytes, PackSettings, pack_nearest};
 use ray_runtime::RayBlob;
 use serde::Serialize;
 

@@ -10,7 +10,7 @@ pub use points::{DeviceSource, on_wire};
 pub use state::{BlobState, DeviceState, SlotState};
 pub use words::state_in_words;
 
-use crate::remedy::Remedy;
+use calib_rays::remedy::Remedy;
 use firmware_sim::client::{ClientError, DeviceClient};
 use firmware_sim::protocol::Refusal;
 use std::time::Duration;

@@ -1,9 +1,9 @@
 //! Measured points against where they truly are, beside what a perfect calibration would do: for anything
 //! that turns matches into points.
 
-use crate::geometry::best_placement;
-use crate::matches::{KnownMatches, TruePoint};
-use crate::measure::{PointSource, Sighting};
+use calib_rays::geometry::best_placement;
+use calib_blob::matches::{KnownMatches, TruePoint};
+use calib_rays::measure::{PointSource, Sighting};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde::Serialize;

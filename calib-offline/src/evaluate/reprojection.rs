@@ -1,10 +1,10 @@
 //! Residuals of corners under a rig, whatever method it comes from.
 
-use crate::adjust::Observations;
-use crate::adjust::residual::linearize;
-use crate::board::BoardShape;
-use crate::field::Rig;
-use crate::geometry::RigidTransform;
+use calib_estimate::adjust::Observations;
+use calib_estimate::adjust::residual::linearize;
+use calib_rays::board::BoardShape;
+use calib_rays::field::Rig;
+use calib_rays::geometry::RigidTransform;
 use nalgebra::Vector2;
 
 /// Observed minus predicted, px, per view and corner of the observations: to first order, as in the
@@ -27,7 +27,7 @@ pub fn residuals(
             let place = camera
                 .zip(rig_from_board.get(view.pose_idx))
                 .map(|(camera, pose)| (camera, camera.rig_from_camera.inverse() * *pose));
-            let residual = |corner: &crate::adjust::observations::ObservedCorner| {
+            let residual = |corner: &calib_estimate::adjust::observations::ObservedCorner| {
                 let (camera, camera_from_board) = place.as_ref()?;
                 let mut point = corner.point_in_board;
                 point.z += board_shape.height_mm(board, &point);
@@ -42,9 +42,9 @@ pub fn residuals(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::init::rig::start_rig;
-    use crate::joint::estimate;
-    use crate::simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
+    use calib_estimate::init::rig::start_rig;
+    use calib_estimate::joint::estimate;
+    use calib_simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
 
     #[test]
     fn residuals_are_those_of_the_joint_estimate() {

@@ -1,10 +1,10 @@
 //! Why a method has no answer.
 
-use crate::alternating::AlternatingError;
-use crate::init::InitError;
-use crate::joint::EstimateError;
-use crate::pinhole::PinholeError;
-use crate::remedy::Remedy;
+use calib_estimate::alternating::AlternatingError;
+use calib_estimate::init::InitError;
+use calib_estimate::joint::EstimateError;
+use calib_estimate::pinhole::PinholeError;
+use calib_rays::remedy::Remedy;
 use std::error::Error;
 use std::sync::Arc;
 

@@ -15,10 +15,10 @@ pub use pinhole::Pinhole;
 pub use screened::Screened;
 pub use solution::{Own, Solution};
 
-use crate::adjust::Observations;
+use calib_estimate::adjust::Observations;
 use crate::evaluate::held_out::Estimated;
 use crate::evaluate::{Folds, estimate_folds};
-use crate::progress::Progress;
+use calib_rays::progress::Progress;
 use screened::JointFound;
 use std::collections::BTreeMap;
 use std::fmt::Debug;

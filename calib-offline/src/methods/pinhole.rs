@@ -2,14 +2,14 @@
 
 use super::solution::{came_to_rest, placed_part, weighted};
 use super::{Given, Method, MethodError, Own, Solution};
-use crate::adjust::Observations;
-use crate::board::BoardShape;
+use calib_estimate::adjust::Observations;
+use calib_rays::board::BoardShape;
 use crate::evaluate::held_out::Estimated;
-use crate::evaluate::reprojection::residuals;
-use crate::geometry::{PixelPoint, RigidTransform};
-use crate::measure::{Point, PointSource, Sighting, Status};
-use crate::pinhole::{Loss, PinholeRig, RigSettings, Settings, calibrate_rig};
-use crate::progress::Progress;
+use calib_estimate::reprojection::residuals;
+use calib_rays::geometry::{PixelPoint, RigidTransform};
+use calib_rays::measure::{Point, PointSource, Sighting, Status};
+use calib_estimate::pinhole::{Loss, PinholeRig, RigSettings, Settings, calibrate_rig};
+use calib_rays::progress::Progress;
 
 /// Pinholes, all cameras and poses together. Residuals count as the joint estimate's do, so that outliers
 /// decide for nobody.

@@ -1,10 +1,10 @@
 //! The views that all methods are given when they are compared.
 
 use super::{Given, MethodError};
-use crate::adjust::Observations;
-use crate::init::rig::start_rig;
-use crate::init::screening::Finding;
-use crate::joint::{Estimate, estimate_screened};
+use calib_estimate::adjust::Observations;
+use calib_estimate::init::rig::start_rig;
+use calib_estimate::init::screening::Finding;
+use calib_estimate::joint::{Estimate, estimate_screened};
 use std::collections::BTreeMap;
 
 /// A joint estimate, and what was found wrong with views on the way.

@@ -1,14 +1,14 @@
 //! What a method found, whichever it was: all that the record, the report and a comparison need.
 
-use crate::adjust::robust::{StudentT, relative_weights, reweight};
-use crate::adjust::{Observations, StopReason};
-use crate::board::BoardShape;
+use calib_estimate::adjust::robust::{StudentT, relative_weights, reweight};
+use calib_estimate::adjust::{Observations, StopReason};
+use calib_rays::board::BoardShape;
 use crate::evaluate::CrossChecks;
 use crate::evaluate::known_points::{Points, measure};
-use crate::field::{RayTable, Rig};
-use crate::geometry::{RigidTransform, SensorSize};
-use crate::init::screening::Finding;
-use crate::measure::{PointSource, RigSource, Sighting};
+use calib_rays::field::{RayTable, Rig};
+use calib_rays::geometry::{RigidTransform, SensorSize};
+use calib_estimate::init::screening::Finding;
+use calib_rays::measure::{PointSource, RigSource, Sighting};
 use crate::report::record::{AlternatingRecord, ChoicesRecord};
 use nalgebra::Vector2;
 use std::collections::BTreeSet;

@@ -1,8 +1,8 @@
 //! What did not go into the estimate as it was recorded, and why, for the record.
 
 use super::parts::Parts;
-use crate::detect::verdict::Outcome;
-use crate::init::screening::{Finding, FindingKind};
+use calib_recording::detect::verdict::Outcome;
+use calib_estimate::init::screening::{Finding, FindingKind};
 use crate::methods::solution::{Unused, unused};
 use crate::report::record::{LeftOut, Renumbered};
 

@@ -1,8 +1,8 @@
 //! What the steps found, for the record.
 
 use super::Corners;
-use crate::adjust::Observations;
-use crate::dataset::Dataset;
+use calib_estimate::adjust::Observations;
+use calib_recording::dataset::Dataset;
 use crate::evaluate::verdict::Thresholds;
 use crate::evaluate::{CrossChecks, HeldOut};
 use crate::methods::Solution;

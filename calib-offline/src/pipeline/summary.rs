@@ -2,13 +2,13 @@
 
 use super::left_out::{left_out, renumbered};
 use super::parts::Parts;
-use crate::dataset::identity::input_sha256;
-use crate::dataset::stage;
+use calib_recording::dataset::identity::input_sha256;
+use calib_recording::dataset::stage;
 use crate::evaluate::half_data::HalfDataCheck;
 use crate::evaluate::verdict::{Figures, judge};
 use crate::evaluate::{CrossChecks, HeldOut, fit_stage_axes};
 use crate::methods::solution::Solution;
-use crate::numerics::rms;
+use calib_rays::numerics::rms;
 use crate::report::record::{
     Calibration, CornerRecord, EstimateRecord, HeldOutRecord, PoseRecord, SCHEMA, StageAxis,
 };
@@ -138,7 +138,7 @@ fn held_out_record(held_out: &HeldOut) -> Option<HeldOutRecord> {
 
 fn pose_records(parts: &Parts, camera_count: usize) -> Vec<PoseRecord> {
     let solution = parts.solution;
-    let all_poses = crate::dataset::corners::poses(&parts.corners.views);
+    let all_poses = calib_recording::dataset::corners::poses(&parts.corners.views);
     solution
         .rig_from_board
         .iter()
@@ -172,7 +172,7 @@ fn pose_records(parts: &Parts, camera_count: usize) -> Vec<PoseRecord> {
 }
 
 fn stage_axes(parts: &Parts, poses: &[PoseRecord]) -> Vec<StageAxis> {
-    let all_poses = crate::dataset::corners::poses(&parts.corners.views);
+    let all_poses = calib_recording::dataset::corners::poses(&parts.corners.views);
     let boards: Vec<_> = poses.iter().map(|p| (p.pose, p.rig_from_board)).collect();
     fit_stage_axes(&boards, |pose| {
         stage::entry(parts.dataset, &all_poses, pose).placement

@@ -202,7 +202,7 @@ fn provenance(calibration: &Calibration) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pack::CurvePoint;
+    use calib_blob::pack::CurvePoint;
     use crate::report::example;
 
     fn blob() -> BlobFacts {

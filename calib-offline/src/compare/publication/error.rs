@@ -1,11 +1,11 @@
 //! Why experiments came to nothing.
 
-use crate::dataset::ManifestError;
-use crate::detect::ring_target::TargetError;
-use crate::matches::MatchesError;
+use calib_recording::dataset::ManifestError;
+use calib_recording::detect::ring_target::TargetError;
+use calib_blob::matches::MatchesError;
 use crate::pipeline::CalibrateError;
-use crate::remedy::Remedy;
-use crate::simulate::SimulateError;
+use calib_rays::remedy::Remedy;
+use calib_simulate::SimulateError;
 use std::path::PathBuf;
 
 /// Why experiments came to nothing.

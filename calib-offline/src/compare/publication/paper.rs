@@ -3,9 +3,9 @@
 //! noise; the target's markers are found in rendered images.
 
 use super::{Evaluation, ExperimentError, ExperimentSettings, evaluate};
-use crate::dataset::Dataset;
-use crate::progress::Progress;
-use crate::simulate::{
+use calib_recording::dataset::Dataset;
+use calib_rays::progress::Progress;
+use calib_simulate::{
     OpticsKind, OutputSettings, Scene, SceneSettings, SimulateError, write_dataset,
 };
 

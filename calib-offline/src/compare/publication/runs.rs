@@ -2,10 +2,10 @@
 
 use super::MethodOutcome;
 use crate::evaluate::known_points::Points;
-use crate::geometry::RigidTransform;
-use crate::measure::Sighting;
+use calib_rays::geometry::RigidTransform;
+use calib_rays::measure::Sighting;
 use crate::methods::{Given, METHODS, MethodError, Solution};
-use crate::progress::Silent;
+use calib_rays::progress::Silent;
 use nalgebra::Vector3;
 
 /// A solution in the frame of the board at a pose that all methods placed.

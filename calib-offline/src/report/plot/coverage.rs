@@ -2,8 +2,8 @@
 
 use super::svg::{Svg, point};
 use super::{Figure, WIDTH};
-use crate::field::CalibratedCamera;
-use crate::geometry::{PixelPoint, SensorSize};
+use calib_rays::field::CalibratedCamera;
+use calib_rays::geometry::{PixelPoint, SensorSize};
 use crate::report::Calibration;
 use std::fmt::Write as _;
 

@@ -4,7 +4,7 @@
 use super::coverage::SensorView;
 use super::svg::{Anchor, Svg, point};
 use super::{Figure, WIDTH};
-use crate::field::CalibratedCamera;
+use calib_rays::field::CalibratedCamera;
 use crate::report::Calibration;
 use crate::report::record::CornerRecord;
 

@@ -2,7 +2,7 @@
 
 use super::svg::{Anchor, Svg};
 use super::{Figure, WIDTH};
-use crate::geometry::{PixelPoint, RigidTransform};
+use calib_rays::geometry::{PixelPoint, RigidTransform};
 use crate::report::Calibration;
 use crate::report::text::short;
 use nalgebra::{Matrix2x3, Vector2, Vector3};

@@ -4,8 +4,8 @@
 use super::coverage::SensorView;
 use super::svg::{Anchor, Svg, point};
 use super::{Figure, WIDTH};
-use crate::field::{CalibratedCamera, PairUncertainty, PointCovariance};
-use crate::geometry::PixelPoint;
+use calib_rays::field::{CalibratedCamera, PairUncertainty, PointCovariance};
+use calib_rays::geometry::PixelPoint;
 use crate::report::Calibration;
 use crate::report::facts::Facts;
 use crate::report::text::short;
