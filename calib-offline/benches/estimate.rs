@@ -6,11 +6,11 @@
 //! less than wall time. Everything measured runs in a process of its own.
 
 use calib_estimate::adjust::Observations;
-use calib_rays::geometry::PixelPoint;
 use calib_estimate::init::rig::start_rig;
 use calib_estimate::joint::evidence::Smoothness;
 use calib_estimate::joint::fit::Fit;
 use calib_estimate::joint::{Estimate, estimate_screened};
+use calib_rays::geometry::PixelPoint;
 use calib_rays::observed::View;
 use calib_simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
 use clap::ValueEnum;

@@ -9,13 +9,13 @@
 mod common;
 
 use calib_estimate::adjust::Observations;
-use calib_rays::geometry::RigidTransform;
 use calib_estimate::init::focal_scan::start_camera;
-use calib_offline::methods::pinhole::PinholeRays;
 use calib_estimate::pinhole::adjustment::{Free, State, minimize};
 use calib_estimate::pinhole::{
     BrownCamera, Loss, PinholeRig, Refine, RigSettings, Settings, calibrate_rig, stereo,
 };
+use calib_offline::methods::pinhole::PinholeRays;
+use calib_rays::geometry::RigidTransform;
 use calib_simulate::{MatchSet, OpticsKind, Scene, SceneSettings};
 use common::against_truth::{MATCHES, errors_and_share, observations};
 use common::{Arguments, Result, print_table};

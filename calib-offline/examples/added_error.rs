@@ -8,9 +8,9 @@
 use anyhow::{Context, bail};
 use calib_blob::matches::BlobSource;
 use calib_blob::matches::read_matches;
-use calib_rays::measure::{PointSource, RigSource};
 use calib_blob::pack::AlignedBytes;
 use calib_offline::report::Calibration;
+use calib_rays::measure::{PointSource, RigSource};
 use ray_runtime::RayBlob;
 use std::path::PathBuf;
 

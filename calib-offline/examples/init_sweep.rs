@@ -7,10 +7,10 @@
 //! `ONLY` is part of a line's name ("fisheye", "640x480", "hand-held" ...).
 
 use calib_estimate::adjust::Observations;
-use calib_rays::board::BoardSpec;
-use calib_rays::geometry::{RigidTransform, SensorSize, so3};
 use calib_estimate::init::rig::start_rig;
 use calib_estimate::init::screening::Finding;
+use calib_rays::board::BoardSpec;
+use calib_rays::geometry::{RigidTransform, SensorSize, so3};
 use calib_simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};

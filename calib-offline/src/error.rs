@@ -1,21 +1,21 @@
 //! What can go wrong, each kind with the error of its own room: the only one that knows all of them.
 
-use calib_recording::atomic_file::WriteError;
 use crate::cli::usage_error::UsageError;
 use crate::compare::CompareError;
 use crate::compare::publication::ExperimentError;
-use calib_recording::dataset::{CornersError, ManifestError, SufficiencyError};
 use crate::demo::DemoError;
-use calib_recording::detect::DetectError;
-use calib_recording::detect::overlay::OverlayError;
-use calib_recording::detect::ring_target::TargetError;
 use crate::device::DeviceError;
+use crate::pipeline::CalibrateError;
+use crate::report::store::CalibrationError;
 use calib_blob::export::ExportError;
 use calib_blob::matches::MatchesError;
 use calib_blob::pack::{BlobError, PackError};
-use crate::pipeline::CalibrateError;
 use calib_rays::remedy::Remedy;
-use crate::report::store::CalibrationError;
+use calib_recording::atomic_file::WriteError;
+use calib_recording::dataset::{CornersError, ManifestError, SufficiencyError};
+use calib_recording::detect::DetectError;
+use calib_recording::detect::overlay::OverlayError;
+use calib_recording::detect::ring_target::TargetError;
 use calib_simulate::SimulateError;
 use std::convert::Infallible;
 

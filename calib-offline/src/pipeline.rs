@@ -11,7 +11,16 @@ mod summary;
 
 pub use error::{CalibrateError, NoSuchPose};
 
+use crate::evaluate::half_data::first_half;
+use crate::evaluate::held_out::folds_wanted;
+use crate::evaluate::verdict::Thresholds;
+use crate::evaluate::{Folds, held_out};
+use crate::methods::{Given, Joint, Method, MethodError, Own, fit_folds};
+use crate::report::Calibration;
 use calib_estimate::adjust::Observations;
+use calib_rays::field::RayTable;
+use calib_rays::observed::View;
+use calib_rays::progress::Progress;
 use calib_recording::dataset::Dataset;
 use calib_recording::dataset::corners::load_corners;
 use calib_recording::dataset::split::without_excluded;
@@ -20,15 +29,6 @@ use calib_recording::dataset::sufficiency::{SufficiencyError, check_sufficiency}
 use calib_recording::detect::suspicion::suspicious_labels;
 use calib_recording::detect::verdict::Outcome;
 use calib_recording::detect::{self, DetectSettings};
-use crate::evaluate::half_data::first_half;
-use crate::evaluate::held_out::folds_wanted;
-use crate::evaluate::verdict::Thresholds;
-use crate::evaluate::{Folds, held_out};
-use calib_rays::field::RayTable;
-use crate::methods::{Given, Joint, Method, MethodError, Own, fit_folds};
-use calib_rays::observed::View;
-use calib_rays::progress::Progress;
-use crate::report::Calibration;
 use parts::Parts;
 
 /// How to calibrate. Nothing here needs to be chosen by the user. Poses are left out by the

@@ -2,14 +2,14 @@
 
 mod common;
 
-use calib_rays::board::BoardSpec;
 use calib_offline::compare::publication::figures::figures;
 use calib_offline::compare::publication::tables::tables;
 use calib_offline::compare::publication::words::text;
 use calib_offline::compare::publication::{Evaluation, ExperimentSettings, evaluate};
-use calib_recording::dataset::Dataset;
 use calib_offline::methods::METHODS;
+use calib_rays::board::BoardSpec;
 use calib_rays::progress::Silent;
+use calib_recording::dataset::Dataset;
 use calib_simulate::{OpticsKind, OutputSettings, Scene, SceneSettings, write_dataset};
 use common::{MANIFEST, contents, corners_csv, dataset, run};
 use std::fs;

@@ -4,12 +4,12 @@ mod common;
 
 use calib_estimate::adjust::Observations;
 use calib_offline::compare::{compare_methods, words};
-use calib_recording::dataset::Dataset;
-use calib_recording::detect::DetectSettings;
 use calib_offline::evaluate::held_out::Estimated;
 use calib_offline::methods::{Given, Joint, Method, MethodError, Pinhole, Solution};
 use calib_offline::pipeline;
 use calib_rays::progress::{Progress, Silent};
+use calib_recording::dataset::Dataset;
+use calib_recording::detect::DetectSettings;
 use common::{MANIFEST, contents, corners_csv, dataset, run};
 use serde_json::Value;
 use std::fs;

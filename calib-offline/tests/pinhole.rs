@@ -2,12 +2,12 @@
 //! `data/opencv-figures/README.md`.
 
 use calib_estimate::adjust::Observations;
+use calib_estimate::pinhole::{PinholeRig, Refine, RigSettings, calibrate_rig};
 use calib_rays::board::BoardSpec;
-use calib_recording::dataset::Dataset;
-use calib_recording::dataset::corners::read_corners;
 use calib_rays::geometry::so3;
 use calib_rays::observed::View;
-use calib_estimate::pinhole::{PinholeRig, Refine, RigSettings, calibrate_rig};
+use calib_recording::dataset::Dataset;
+use calib_recording::dataset::corners::read_corners;
 use calib_simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
 use serde::Deserialize;
 use std::collections::BTreeMap;

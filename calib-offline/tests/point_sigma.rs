@@ -3,12 +3,12 @@
 
 mod common;
 
-use calib_rays::field::PairUncertainty;
-use calib_rays::field::uncertainty::packed;
 use calib_blob::matches::BlobSource;
-use calib_rays::measure::{PointSource, RigSource};
 use calib_blob::pack::{AlignedBytes, PackSettings, pack};
 use calib_offline::report::Calibration;
+use calib_rays::field::PairUncertainty;
+use calib_rays::field::uncertainty::packed;
+use calib_rays::measure::{PointSource, RigSource};
 use calib_simulate::{MatchSet, OpticsKind};
 use common::against_truth::{run_scene, scene};
 use common::{SENSOR, calibration, project, run};

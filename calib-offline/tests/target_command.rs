@@ -2,10 +2,10 @@
 
 mod common;
 
-use calib_recording::dataset::{Dataset, load_markers};
-use calib_recording::detect::ring_target::{TargetSettings, join_markers, target_views};
 use calib_rays::progress::Silent;
 use calib_rays::remedy::Remedy as _;
+use calib_recording::dataset::{Dataset, load_markers};
+use calib_recording::detect::ring_target::{TargetSettings, join_markers, target_views};
 use common::{contents, run};
 use std::collections::BTreeMap;
 use std::fs;

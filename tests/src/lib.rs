@@ -6,17 +6,17 @@
     reason = "a fixture that cannot be made is a failed test"
 )]
 
-use calib_rays::board::BoardSpec;
-use calib_recording::dataset::Dataset;
+use calib_blob::pack::{AlignedBytes, PackSettings, Packed, pack};
 use calib_offline::demo::device::Pair;
 use calib_offline::device::on_wire;
 use calib_offline::evaluate::known_points::{PointWithTruth, TruthErrors, compare_with_truth};
-use calib_rays::geometry::SensorSize;
-use calib_blob::pack::{AlignedBytes, PackSettings, Packed, pack};
 use calib_offline::pipeline::{CalibrateSettings, Checked, calibrate_corners, corners};
-use calib_rays::progress::Silent;
 use calib_offline::report::Calibration;
 use calib_offline::report::facts::Facts;
+use calib_rays::board::BoardSpec;
+use calib_rays::geometry::SensorSize;
+use calib_rays::progress::Silent;
+use calib_recording::dataset::Dataset;
 use calib_simulate::{
     MatchSet, OpticsKind, OutputSettings, Scene, SceneSettings, TrueMatch, write_dataset,
 };

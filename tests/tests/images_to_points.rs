@@ -5,8 +5,8 @@
 use calib_estimate::adjust::residual::linearize;
 use calib_offline::demo::DeviceCheck;
 use calib_offline::demo::device::check;
-use calib_rays::geometry::PixelPoint;
 use calib_offline::report::Calibration;
+use calib_rays::geometry::PixelPoint;
 use calib_simulate::{MatchSet, OpticsKind, Scene};
 use firmware_sim::client::DeviceClient;
 use firmware_sim::flash_file::FlashFile;

@@ -216,8 +216,8 @@ fn board_warning(dataset: &Dataset, views: &[View]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use calib_rays::board::BoardSpec;
     use crate::dataset::CameraSpec;
+    use calib_rays::board::BoardSpec;
 
     fn dataset(sensor: SensorSize) -> Dataset {
         Dataset {

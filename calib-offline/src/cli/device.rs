@@ -3,9 +3,9 @@
 use super::Outcome;
 use super::output::Console;
 use super::usage_error::UsageError;
-use calib_recording::dataset::identity::hex;
 use crate::device::{DeviceError, DeviceState, connect, state_in_words};
 use crate::error::Error;
+use calib_recording::dataset::identity::hex;
 use clap::{Args, Subcommand};
 use firmware_sim::client::DeviceClient;
 use serde::Serialize;

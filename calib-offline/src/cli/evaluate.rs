@@ -2,7 +2,6 @@
 
 use super::Outcome;
 use super::output::Console;
-use calib_recording::atomic_file::{check_folder, check_writable, make_folder, write_set};
 use crate::compare::publication::figures::figures;
 use crate::compare::publication::paper::evaluate_set_up;
 use crate::compare::publication::tables::tables;
@@ -10,8 +9,9 @@ use crate::compare::publication::words::{
     COMPARABLE, PUBLISHED_DEVIATION_MM, PUBLISHED_MEAN_MM, text,
 };
 use crate::compare::publication::{Evaluation, ExperimentSettings, evaluate};
-use calib_recording::dataset::Dataset;
 use crate::error::Error;
+use calib_recording::atomic_file::{check_folder, check_writable, make_folder, write_set};
+use calib_recording::dataset::Dataset;
 use clap::Args;
 use serde::Serialize;
 use std::path::{Path, PathBuf};

@@ -4,11 +4,11 @@ use super::Outcome;
 use super::calibrate::say_what_is_used;
 use super::output::Console;
 use super::place::check_results_folder;
-use calib_recording::atomic_file::{make_folder, write_set};
 use crate::compare::{Comparison, compare, words};
-use calib_recording::dataset::Dataset;
 use crate::error::Error;
 use crate::pipeline;
+use calib_recording::atomic_file::{make_folder, write_set};
+use calib_recording::dataset::Dataset;
 use clap::Args;
 use std::path::{Path, PathBuf};
 

@@ -5,8 +5,8 @@
 //! calibration is not cheap, so its folder must not hold one.
 
 use super::usage_error::UsageError;
-use calib_recording::atomic_file::{check_place, check_writable};
 use crate::error::Error;
+use calib_recording::atomic_file::{check_place, check_writable};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;

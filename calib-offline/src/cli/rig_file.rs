@@ -2,8 +2,8 @@
 
 use super::usage_error::UsageError;
 use crate::error::Error;
-use calib_blob::pack::{AlignedBytes, BlobError};
 use crate::report::Calibration;
+use calib_blob::pack::{AlignedBytes, BlobError};
 use ray_runtime::RayBlob;
 use ray_runtime::format::MAGIC;
 use std::path::Path;

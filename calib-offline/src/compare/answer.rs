@@ -1,11 +1,11 @@
 //! A solution in terms of the views that all methods were given: it may have left some of them out.
 
+use crate::methods::Solution;
 use calib_estimate::adjust::Observations;
 use calib_estimate::adjust::observations::ViewBlock;
 use calib_rays::board::BoardShape;
 use calib_rays::field::Rig;
 use calib_rays::geometry::RigidTransform;
-use crate::methods::Solution;
 use std::collections::HashSet;
 
 /// What a method made of all that it was given.

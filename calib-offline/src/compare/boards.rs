@@ -1,10 +1,10 @@
 //! Boards that no method saw, judged on the corners that every method can answer: a method that
 //! refuses the difficult part of the image would else look the better for it.
 
-use calib_estimate::adjust::Observations;
-use calib_estimate::adjust::observations::{ObservedCorner, ViewBlock};
 use crate::evaluate::held_out::{BoardErrors, Fold, measure_boards};
 use crate::evaluate::resection::residuals_with_free_pose;
+use calib_estimate::adjust::Observations;
+use calib_estimate::adjust::observations::{ObservedCorner, ViewBlock};
 use calib_rays::field::Rig;
 use calib_rays::geometry::PixelPoint;
 use calib_rays::measure::RigSource;
@@ -125,8 +125,8 @@ fn score_board(folds: &[&Fold], board: &Observations) -> Vec<BoardScore> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use calib_rays::board::BoardShape;
     use calib_estimate::pinhole::{RigSettings, calibrate_rig};
+    use calib_rays::board::BoardShape;
     use calib_simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
 
     #[test]

@@ -1,7 +1,7 @@
 //! Why methods cannot be compared.
 
-use calib_blob::matches::MatchesError;
 use crate::pipeline::CalibrateError;
+use calib_blob::matches::MatchesError;
 use calib_rays::remedy::Remedy;
 
 /// Why methods cannot be compared.

@@ -16,15 +16,15 @@ pub mod words;
 pub use error::CompareError;
 pub use record::{Comparison, MethodFigures, SCHEMA};
 
-use calib_recording::dataset::identity::input_sha256;
-use calib_recording::dataset::{Dataset, stage};
 use crate::evaluate::Folds;
 use crate::evaluate::held_out::folds_wanted;
-use calib_blob::matches::read_known;
 use crate::methods::{Given, Joint, METHODS, Method, MethodError, Screened, fit_folds};
 use crate::pipeline::{Corners, camera_names, explained, offered};
-use calib_rays::progress::{Progress, Silent};
 use answer::Answer;
+use calib_blob::matches::read_known;
+use calib_rays::progress::{Progress, Silent};
+use calib_recording::dataset::identity::input_sha256;
+use calib_recording::dataset::{Dataset, stage};
 use figures::{add_held_out, add_training, add_truth, without_outliers, working_distance_mm};
 use std::time::{Duration, Instant};
 

@@ -3,9 +3,9 @@
 
 use super::DemoError;
 use crate::device::on_wire;
+use crate::report::Calibration;
 use calib_blob::matches::KnownMatches;
 use calib_rays::measure::Sighting;
-use crate::report::Calibration;
 use firmware_sim::client::{ClientError, DeviceClient, FlashOptions};
 use firmware_sim::host::SimulatedDevice;
 use firmware_sim::protocol::Point;

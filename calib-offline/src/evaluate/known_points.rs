@@ -1,8 +1,8 @@
 //! Measured points against where they truly are, beside what a perfect calibration would do: for anything
 //! that turns matches into points.
 
-use calib_rays::geometry::best_placement;
 use calib_blob::matches::{KnownMatches, TruePoint};
+use calib_rays::geometry::best_placement;
 use calib_rays::measure::{PointSource, Sighting};
 use nalgebra::Vector3;
 use rayon::prelude::*;

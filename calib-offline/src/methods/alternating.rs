@@ -2,19 +2,21 @@
 
 use super::solution::{placed_part, positive, weighted};
 use super::{Given, Method, MethodError, Own, Solution};
+use crate::evaluate::held_out::Estimated;
+use crate::report::record::AlternatingRecord;
 use calib_estimate::adjust::Observations;
 use calib_estimate::alternating::alternation::{Alternated, AlternationStop};
 use calib_estimate::alternating::field_rig::FieldRig;
-use calib_estimate::alternating::{AlternatingError, AlternatingEstimate, AlternatingSettings, estimate};
-use calib_rays::board::BoardShape;
-use crate::evaluate::held_out::Estimated;
+use calib_estimate::alternating::{
+    AlternatingError, AlternatingEstimate, AlternatingSettings, estimate,
+};
+use calib_estimate::init::rig::{RigStart, start_rig};
 use calib_estimate::reprojection::residuals;
+use calib_rays::board::BoardShape;
 use calib_rays::field::{BaseLens, MeasureError, RayTable, Rig};
 use calib_rays::geometry::{PixelPoint, Ray, SensorSize, triangulate_pair, triangulate_rays};
-use calib_estimate::init::rig::{RigStart, start_rig};
 use calib_rays::measure::{Point, PointSource, Sighting, Status};
 use calib_rays::progress::Progress;
-use crate::report::record::AlternatingRecord;
 use nalgebra::Vector2;
 use std::collections::BTreeMap;
 

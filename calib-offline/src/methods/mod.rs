@@ -15,9 +15,9 @@ pub use pinhole::Pinhole;
 pub use screened::Screened;
 pub use solution::{Own, Solution};
 
-use calib_estimate::adjust::Observations;
 use crate::evaluate::held_out::Estimated;
 use crate::evaluate::{Folds, estimate_folds};
+use calib_estimate::adjust::Observations;
 use calib_rays::progress::Progress;
 use screened::JointFound;
 use std::collections::BTreeMap;

@@ -2,13 +2,13 @@
 
 use super::solution::{came_to_rest, placed_part, weighted};
 use super::{Given, Method, MethodError, Own, Solution};
-use calib_estimate::adjust::Observations;
-use calib_rays::board::BoardShape;
 use crate::evaluate::held_out::Estimated;
+use calib_estimate::adjust::Observations;
+use calib_estimate::pinhole::{Loss, PinholeRig, RigSettings, Settings, calibrate_rig};
 use calib_estimate::reprojection::residuals;
+use calib_rays::board::BoardShape;
 use calib_rays::geometry::{PixelPoint, RigidTransform};
 use calib_rays::measure::{Point, PointSource, Sighting, Status};
-use calib_estimate::pinhole::{Loss, PinholeRig, RigSettings, Settings, calibrate_rig};
 use calib_rays::progress::Progress;
 
 /// Pinholes, all cameras and poses together. Residuals count as the joint estimate's do, so that outliers

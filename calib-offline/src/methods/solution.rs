@@ -1,15 +1,15 @@
 //! What a method found, whichever it was: all that the record, the report and a comparison need.
 
-use calib_estimate::adjust::robust::{StudentT, relative_weights, reweight};
-use calib_estimate::adjust::{Observations, StopReason};
-use calib_rays::board::BoardShape;
 use crate::evaluate::CrossChecks;
 use crate::evaluate::known_points::{Points, measure};
+use crate::report::record::{AlternatingRecord, ChoicesRecord};
+use calib_estimate::adjust::robust::{StudentT, relative_weights, reweight};
+use calib_estimate::adjust::{Observations, StopReason};
+use calib_estimate::init::screening::Finding;
+use calib_rays::board::BoardShape;
 use calib_rays::field::{RayTable, Rig};
 use calib_rays::geometry::{RigidTransform, SensorSize};
-use calib_estimate::init::screening::Finding;
 use calib_rays::measure::{PointSource, RigSource, Sighting};
-use crate::report::record::{AlternatingRecord, ChoicesRecord};
 use nalgebra::Vector2;
 use std::collections::BTreeSet;
 use std::fmt::Debug;

@@ -1,10 +1,10 @@
 //! Why a dataset gives no calibration.
 
+use crate::methods::MethodError;
+use calib_rays::remedy::Remedy;
 use calib_recording::dataset::{CornersError, SufficiencyError};
 use calib_recording::detect::DetectError;
 use calib_recording::detect::suspicion::LabelSuspicion;
-use crate::methods::MethodError;
-use calib_rays::remedy::Remedy;
 
 /// Why a dataset gives no calibration.
 #[derive(Debug, thiserror::Error)]

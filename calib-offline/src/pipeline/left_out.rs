@@ -1,10 +1,10 @@
 //! What did not go into the estimate as it was recorded, and why, for the record.
 
 use super::parts::Parts;
-use calib_recording::detect::verdict::Outcome;
-use calib_estimate::init::screening::{Finding, FindingKind};
 use crate::methods::solution::{Unused, unused};
 use crate::report::record::{LeftOut, Renumbered};
+use calib_estimate::init::screening::{Finding, FindingKind};
+use calib_recording::detect::verdict::Outcome;
 
 /// Poses, views and corners that did not go in.
 pub fn left_out(parts: &Parts, names: &[String]) -> Vec<LeftOut> {

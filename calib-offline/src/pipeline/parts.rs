@@ -1,11 +1,11 @@
 //! What the steps found, for the record.
 
 use super::Corners;
-use calib_estimate::adjust::Observations;
-use calib_recording::dataset::Dataset;
 use crate::evaluate::verdict::Thresholds;
 use crate::evaluate::{CrossChecks, HeldOut};
 use crate::methods::Solution;
+use calib_estimate::adjust::Observations;
+use calib_recording::dataset::Dataset;
 
 /// Results of all steps.
 pub struct Parts<'a> {

@@ -2,16 +2,16 @@
 
 use super::left_out::{left_out, renumbered};
 use super::parts::Parts;
-use calib_recording::dataset::identity::input_sha256;
-use calib_recording::dataset::stage;
 use crate::evaluate::half_data::HalfDataCheck;
 use crate::evaluate::verdict::{Figures, judge};
 use crate::evaluate::{CrossChecks, HeldOut, fit_stage_axes};
 use crate::methods::solution::Solution;
-use calib_rays::numerics::rms;
 use crate::report::record::{
     Calibration, CornerRecord, EstimateRecord, HeldOutRecord, PoseRecord, SCHEMA, StageAxis,
 };
+use calib_rays::numerics::rms;
+use calib_recording::dataset::identity::input_sha256;
+use calib_recording::dataset::stage;
 use nalgebra::Vector2;
 
 /// The record of a calibration.

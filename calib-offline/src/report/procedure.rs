@@ -119,9 +119,9 @@ pub fn draw(calibration: &Calibration) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::example;
     use calib_estimate::alternating::estimate::StartCost;
     use calib_estimate::alternating::spread::{SpreadChoice, SpreadError};
-    use crate::report::example;
 
     #[test]
     fn what_was_chosen_and_what_was_not_is_told() {

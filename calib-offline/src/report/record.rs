@@ -1,16 +1,16 @@
 //! `calibration.json`: everything a calibration found, versioned, enough to draw every figure again.
 
-use calib_estimate::alternating::estimate::{PlacementCircles, StartCost};
-use calib_estimate::alternating::spread::SpreadChoice;
-pub use calib_rays::board::BoardShape;
-use calib_rays::board::BoardSpec;
 pub use crate::evaluate::CrossChecks;
 pub use crate::evaluate::held_out::FailedFold;
 pub use crate::evaluate::stage_axis::StageAxis;
 pub use crate::evaluate::verdict::{Grade, Verdict};
+use calib_estimate::alternating::estimate::{PlacementCircles, StartCost};
+use calib_estimate::alternating::spread::SpreadChoice;
+use calib_estimate::joint::{Choice, SmoothnessFound};
+pub use calib_rays::board::BoardShape;
+use calib_rays::board::BoardSpec;
 use calib_rays::field::Rig;
 use calib_rays::geometry::{PixelPoint, RigidTransform};
-use calib_estimate::joint::{Choice, SmoothnessFound};
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 

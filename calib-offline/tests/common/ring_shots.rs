@@ -1,9 +1,9 @@
 //! Rendered images of the ring target, and how far what is found in them lies from the truth.
 
+use calib_rays::geometry::{PixelPoint, RigidTransform, so3};
 use calib_recording::dataset::TargetSpec;
 use calib_recording::dataset::image::GrayImage;
 use calib_recording::detect::ring_target::{Located, TargetRefusal, TargetSettings, locate};
-use calib_rays::geometry::{PixelPoint, RigidTransform, so3};
 use calib_simulate::pattern::{
     DIRECTION_MARKERS, DIRECTION_RADII_MM, RING_COLS, RING_PITCH_MM, RING_RADII_MM, RING_ROWS,
 };

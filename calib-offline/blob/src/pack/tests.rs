@@ -2,7 +2,9 @@
 
 use super::*;
 use calib_rays::field::spline::{Spline, SplineGrid};
-use calib_rays::field::{BaseLens, CalibratedCamera, CoverageMask, Projection, RayField, SmoothMap};
+use calib_rays::field::{
+    BaseLens, CalibratedCamera, CoverageMask, Projection, RayField, SmoothMap,
+};
 use calib_rays::geometry::{PixelPoint, RigidTransform, SensorSize, so3};
 use nalgebra::{Vector2, Vector3};
 use ray_runtime::OpenError;

@@ -165,7 +165,12 @@ fn forms(
         .map_or(0, |offset| offset.polynomial.degree)
         .max(camera.field.direction.polynomial.degree);
     let mut products = Vec::new();
-    calib_rays::field::polynomial::basis(camera.field.sensor, degree, sighting.pixel, &mut products);
+    calib_rays::field::polynomial::basis(
+        camera.field.sensor,
+        degree,
+        sighting.pixel,
+        &mut products,
+    );
     let ranges = &layout.cameras[sighting.camera_idx];
     let by_pose_turn = -by_rig * skew(&turned_in_board);
     let by_camera_turn = -l.by_point * skew(&turned_in_rig);

@@ -3,9 +3,9 @@
 use super::k_means::k_means;
 use super::network::{Distances, Network};
 use crate::adjust::observations::ObservedCorner;
+use crate::init::bearing_pose::BoardHomography;
 use calib_rays::geometry::PixelPoint;
 use calib_rays::geometry::hull::{convex_hull, hull_contains};
-use crate::init::bearing_pose::BoardHomography;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// Fewest corners that a network is trained on.

@@ -8,9 +8,9 @@
 
 use super::stereo::{Mean, mean_pose, relative_pose};
 use crate::adjust::Observations;
-use calib_rays::geometry::RigidTransform;
 use crate::init::rig::RigStart;
 use crate::pinhole::{CameraFit, Loss, PinholeRig, RigSettings, Settings, calibrate_rig};
+use calib_rays::geometry::RigidTransform;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 

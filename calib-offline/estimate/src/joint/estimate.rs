@@ -8,10 +8,10 @@ use super::rebase::rebase;
 use crate::adjust::levenberg::{Settings, StopReason};
 use crate::adjust::robust::{StudentT, relative_weights};
 use crate::adjust::{CameraModel, Model, Observations};
+use crate::init::rig::RigStart;
 use calib_rays::board::BoardShape;
 use calib_rays::field::polynomial::term_count;
 use calib_rays::field::structured::StructuredBasis;
-use crate::init::rig::RigStart;
 use nalgebra::Vector2;
 
 /// Total degree of the field's polynomial (METHOD 9A).

@@ -4,10 +4,10 @@
 use super::error::EstimateError;
 use super::estimate::{Estimate, estimate};
 use crate::adjust::Observations;
-use calib_rays::field::RayField;
 use crate::init::pair_consensus::FINE_LIMIT_SIGMA;
 use crate::init::rig::RigStart;
 use crate::init::screening::{Finding, screen};
+use calib_rays::field::RayField;
 
 /// Estimates again, at most so often, as long as the judgement of the views changes.
 const MOST_REPEATS: usize = 2;

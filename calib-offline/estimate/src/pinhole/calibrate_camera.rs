@@ -6,9 +6,9 @@ use super::brown::{BrownCamera, INTRINSICS};
 use super::homography::PixelHomography;
 use super::zhang::{ZhangForm, zhang};
 use crate::adjust::{Observations, StopReason};
-use calib_rays::geometry::{RigidTransform, SensorSize};
 use crate::init::focal_scan::start_camera;
 use crate::init::{InitError, MIN_POSES};
+use calib_rays::geometry::{RigidTransform, SensorSize};
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 

@@ -2,9 +2,9 @@
 //! known (METHOD (4), (5)).
 
 use crate::adjust::observations::ViewBlock;
-use calib_rays::geometry::{PixelPoint, RigidTransform, SensorSize};
 use crate::init::bearing_pose::BoardHomography;
 use crate::init::is_usable;
+use calib_rays::geometry::{PixelPoint, RigidTransform, SensorSize};
 use nalgebra::{Matrix3, Vector3};
 
 /// `z (u, v, 1)^T = H (X, Y, 1)^T` for a view of a flat board.

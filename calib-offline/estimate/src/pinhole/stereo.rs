@@ -7,9 +7,9 @@ use super::calibrate_camera::{CameraFit, calibrate_camera};
 use super::rig::PinholeRig;
 use crate::adjust::Observations;
 use crate::adjust::observations::ViewBlock;
+use crate::init::InitError;
 use calib_rays::geometry::{RigidTransform, so3};
 use calib_rays::in_order;
-use crate::init::InitError;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 

@@ -4,10 +4,10 @@ use super::adjustment::{Loss, Settings};
 use super::{PinholeError, PinholeRig, Refine, RigSettings};
 use super::{calibrate_camera, calibrate_rig};
 use crate::adjust::{Observations, StopReason};
-use calib_rays::board::BoardShape;
-use crate::reprojection::residuals;
-use calib_rays::geometry::{RigidTransform, so3};
 use crate::init::InitError;
+use crate::reprojection::residuals;
+use calib_rays::board::BoardShape;
+use calib_rays::geometry::{RigidTransform, so3};
 use calib_simulate::optics::{Distortion, Lens};
 use calib_simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
 

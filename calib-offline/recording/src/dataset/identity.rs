@@ -60,8 +60,8 @@ pub fn hex(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use calib_rays::board::BoardSpec;
     use crate::dataset::CameraSpec;
+    use calib_rays::board::BoardSpec;
     use calib_rays::geometry::{PixelPoint, SensorSize};
     use calib_rays::observed::Corner;
 

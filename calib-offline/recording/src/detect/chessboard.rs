@@ -4,8 +4,8 @@
 //! the numbers mean on the board, and where exactly the corners are, is settled by us (see
 //! [`super::labelling`] and [`super::corner_fit`]).
 
-use calib_rays::board::BoardSpec;
 use crate::dataset::image::GrayImage;
+use calib_rays::board::BoardSpec;
 use calib_rays::geometry::PixelPoint;
 use calib_targets::chessboard::{
     ChessboardDetector as TopologicalGrid, ChessboardParams, GrayImageView, default_chess_config,

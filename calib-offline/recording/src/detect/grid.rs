@@ -2,8 +2,8 @@
 
 use super::chessboard::RawCorner;
 use super::corner_fit::{CornerGuess, FittedCorner, fit_corner};
-use calib_rays::board::BoardSpec;
 use crate::dataset::image::GrayImage;
+use calib_rays::board::BoardSpec;
 use calib_rays::geometry::PixelPoint;
 use nalgebra::{Matrix2, Vector2};
 use std::collections::{BTreeMap, BTreeSet};

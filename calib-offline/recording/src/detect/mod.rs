@@ -25,14 +25,14 @@ pub mod verdict;
 #[cfg(test)]
 mod tests;
 
-use calib_rays::board::BoardSpec;
 use crate::dataset::Dataset;
 use crate::dataset::image::{GrayImage, ImageError};
+use border::Borders;
+use calib_rays::board::BoardSpec;
 use calib_rays::geometry::{PixelPoint, SensorSize};
 use calib_rays::observed::{Corner, View};
 use calib_rays::progress::Progress;
 use calib_rays::remedy::Remedy;
-use border::Borders;
 use chessboard::{ChessTopologicalDetector, ChessboardDetector};
 use consistency::{ConsistencyError, UnsettledView};
 use epipolar::{FundamentalMatrix, Match};

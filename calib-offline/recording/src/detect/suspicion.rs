@@ -210,8 +210,8 @@ fn distance_px(views: &[View], camera_idx: usize, steps: i64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use calib_rays::board::BoardSpec;
     use crate::dataset::CameraSpec;
+    use calib_rays::board::BoardSpec;
     use calib_rays::geometry::{PixelPoint, SensorSize, so3};
     use nalgebra::Vector3;
 

@@ -1,8 +1,8 @@
 //! What became of each image: used, or refused and why.
 
 use super::grid::{FittedGrid, Typical};
-use calib_rays::board::BoardSpec;
 use crate::dataset::image::GrayImage;
+use calib_rays::board::BoardSpec;
 use std::path::PathBuf;
 
 /// The verdict on one image.

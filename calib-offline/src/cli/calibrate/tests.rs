@@ -1,8 +1,8 @@
 use super::*;
 use crate::cli::settings::{Narration, Settings};
 use crate::cli::usage_error::UsageError;
-use calib_recording::dataset::{CornersError, SufficiencyError};
 use crate::report::example;
+use calib_recording::dataset::{CornersError, SufficiencyError};
 use std::fs;
 
 fn console() -> Console {

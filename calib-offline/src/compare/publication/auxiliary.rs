@@ -3,8 +3,8 @@
 
 use super::ExperimentError;
 use calib_rays::board::BoardSpec;
-use calib_recording::dataset::Dataset;
 use calib_rays::geometry::PixelPoint;
+use calib_recording::dataset::Dataset;
 use calib_simulate::{CameraOptics, Scene, SceneSettings};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};

@@ -1,10 +1,10 @@
 //! Why experiments came to nothing.
 
+use crate::pipeline::CalibrateError;
+use calib_blob::matches::MatchesError;
+use calib_rays::remedy::Remedy;
 use calib_recording::dataset::ManifestError;
 use calib_recording::detect::ring_target::TargetError;
-use calib_blob::matches::MatchesError;
-use crate::pipeline::CalibrateError;
-use calib_rays::remedy::Remedy;
 use calib_simulate::SimulateError;
 use std::path::PathBuf;
 

@@ -26,13 +26,13 @@ pub mod words;
 
 pub use error::ExperimentError;
 
+use crate::methods::Screened;
+use crate::pipeline::{self, camera_names, explained, offered};
+use calib_rays::progress::Progress;
 use calib_recording::dataset::Dataset;
 use calib_recording::dataset::corners::poses;
 use calib_recording::dataset::stage::{entry, placements};
 use calib_recording::detect::DetectSettings;
-use crate::methods::Screened;
-use crate::pipeline::{self, camera_names, explained, offered};
-use calib_rays::progress::Progress;
 use runs::MethodRun;
 use serde::Serialize;
 use std::path::PathBuf;

@@ -3,8 +3,8 @@
 //! noise; the target's markers are found in rendered images.
 
 use super::{Evaluation, ExperimentError, ExperimentSettings, evaluate};
-use calib_recording::dataset::Dataset;
 use calib_rays::progress::Progress;
+use calib_recording::dataset::Dataset;
 use calib_simulate::{
     OpticsKind, OutputSettings, Scene, SceneSettings, SimulateError, write_dataset,
 };

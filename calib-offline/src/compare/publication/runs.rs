@@ -2,9 +2,9 @@
 
 use super::MethodOutcome;
 use crate::evaluate::known_points::Points;
+use crate::methods::{Given, METHODS, MethodError, Solution};
 use calib_rays::geometry::RigidTransform;
 use calib_rays::measure::Sighting;
-use crate::methods::{Given, METHODS, MethodError, Solution};
 use calib_rays::progress::Silent;
 use nalgebra::Vector3;
 

@@ -4,16 +4,16 @@
 use super::ExperimentError;
 use super::runs::{InDatum, MethodRun, measure_all};
 use super::statistics::ErrorStatistics;
-use calib_rays::board::BoardSpec;
-use calib_recording::dataset::{Dataset, TargetSpec};
-use calib_recording::detect::ring_target::{
-    MarkerMatch, TargetError, TargetSettings, join_markers, target_views,
-};
 use crate::evaluate::measured_board::MeasuredBoard;
+use calib_rays::board::BoardSpec;
 use calib_rays::geometry::best_placement;
 use calib_rays::measure::Sighting;
 use calib_rays::numerics::rms;
 use calib_rays::progress::Progress;
+use calib_recording::dataset::{Dataset, TargetSpec};
+use calib_recording::detect::ring_target::{
+    MarkerMatch, TargetError, TargetSettings, join_markers, target_views,
+};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -1,6 +1,6 @@
 use super::*;
-use calib_rays::board::BoardSpec;
 use crate::dataset::{CameraSpec, StageSpec};
+use calib_rays::board::BoardSpec;
 use calib_rays::geometry::SensorSize;
 use calib_rays::remedy::Remedy as _;
 

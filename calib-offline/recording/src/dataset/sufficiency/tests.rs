@@ -1,6 +1,6 @@
 use super::*;
-use calib_rays::board::BoardSpec;
 use crate::dataset::CameraSpec;
+use calib_rays::board::BoardSpec;
 use calib_rays::geometry::{PixelPoint, SensorSize};
 
 fn dataset(names: &[&str]) -> Dataset {

@@ -1,7 +1,7 @@
 //! A small renderer: a flat board through a pinhole, averaged over each pixel, blurred, noisy.
 
-use calib_rays::board::BoardSpec;
 use crate::dataset::image::GrayImage;
+use calib_rays::board::BoardSpec;
 use calib_rays::geometry::{PixelPoint, SensorSize, so3};
 use nalgebra::{Matrix3, Vector3};
 use rand::SeedableRng;
