@@ -1,4 +1,5 @@
-//! How strongly smoothness holds, from the data themselves (METHOD 2.4, 9A).
+//! How strongly smoothness holds, from the data themselves: hyperparameters by the evidence, which is
+//! the marginal likelihood of the data (METHOD 2.4, 9A).
 
 use super::fit::Fit;
 use crate::adjust::banded::BandedMatrix;
