@@ -8,9 +8,9 @@
 #[allow(dead_code, reason = "other benches use the rest")]
 mod common;
 
-use calib_offline::geometry::SensorSize;
-use calib_offline::joint::Estimate;
-use calib_offline::simulate::{MatchSet, OpticsKind, Scene, SceneSettings};
+use calib_estimate::joint::Estimate;
+use calib_rays::geometry::SensorSize;
+use calib_simulate::{MatchSet, OpticsKind, Scene, SceneSettings};
 use common::against_truth::{Coverage, coverage, hand_held, measure_set, run_scene};
 use common::{Arguments, Result, print_table};
 use std::process::ExitCode;

@@ -8,10 +8,10 @@
 #[allow(dead_code, reason = "other benches use the rest")]
 mod common;
 
-use calib_offline::alternating::alternation::AlternationSettings;
-use calib_offline::alternating::{AlternatingSettings, estimate};
-use calib_offline::init::rig::start_rig;
-use calib_offline::simulate::{MatchSet, OpticsKind, Scene, SceneSettings};
+use calib_estimate::alternating::alternation::AlternationSettings;
+use calib_estimate::alternating::{AlternatingSettings, estimate};
+use calib_estimate::init::rig::start_rig;
+use calib_simulate::{MatchSet, OpticsKind, Scene, SceneSettings};
 use common::against_truth::{errors_and_share, observations};
 use common::{Arguments, Result, print_table};
 use std::process::ExitCode;

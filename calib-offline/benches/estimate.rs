@@ -5,14 +5,14 @@
 //! Figures are CPU seconds of the whole process (user time), so that a busy machine disturbs them
 //! less than wall time. Everything measured runs in a process of its own.
 
-use calib_offline::adjust::Observations;
-use calib_offline::geometry::PixelPoint;
-use calib_offline::init::rig::start_rig;
-use calib_offline::joint::evidence::Smoothness;
-use calib_offline::joint::fit::Fit;
-use calib_offline::joint::{Estimate, estimate_screened};
-use calib_offline::observed::View;
-use calib_offline::simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
+use calib_estimate::adjust::Observations;
+use calib_estimate::init::rig::start_rig;
+use calib_estimate::joint::evidence::Smoothness;
+use calib_estimate::joint::fit::Fit;
+use calib_estimate::joint::{Estimate, estimate_screened};
+use calib_rays::geometry::PixelPoint;
+use calib_rays::observed::View;
+use calib_simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
 use clap::ValueEnum;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -127,7 +127,7 @@ fn cells() -> Result<()> {
             };
             let sensor = camera.field.sensor;
             let spacing_px = f64::from(sensor.width.max(sensor.height)) / cells;
-            let grid = calib_offline::field::spline::SplineGrid::with_spacing(sensor, spacing_px);
+            let grid = calib_rays::field::spline::SplineGrid::with_spacing(sensor, spacing_px);
             camera.field.direction.spline = Some(spline.resampled(grid));
         }
         let unknowns: usize = model.cameras.iter().map(|c| c.spline_amounts().len()).sum();

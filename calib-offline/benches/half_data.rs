@@ -7,7 +7,7 @@
 mod common;
 
 use calib_offline::evaluate::half_data::HalfData;
-use calib_offline::simulate::{OpticsKind, Scene, SceneSettings};
+use calib_simulate::{OpticsKind, Scene, SceneSettings};
 use common::halves::{halves_of, halves_of_one_camera};
 use common::{Arguments, Result, print_table};
 use std::process::ExitCode;
@@ -47,7 +47,7 @@ fn table(arguments: &Arguments) -> Result<()> {
 fn print(name: &str, drawn: &[HalfData]) {
     let ratios: Vec<f64> = drawn.iter().map(|halves| halves.ratio).collect();
     let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
-    let rms = calib_offline::numerics::rms(&ratios).unwrap_or(f64::NAN);
+    let rms = calib_rays::numerics::rms(&ratios).unwrap_or(f64::NAN);
     let least = ratios.iter().copied().fold(f64::INFINITY, f64::min);
     let most = ratios.iter().copied().fold(0.0, f64::max);
     println!("{name:<18} {least:.2} to {most:.2}  mean {mean:.3}  rms {rms:.3}");

@@ -8,14 +8,14 @@
 #[allow(dead_code, reason = "other benches use the rest")]
 mod common;
 
-use calib_offline::adjust::Observations;
-use calib_offline::geometry::RigidTransform;
-use calib_offline::init::focal_scan::start_camera;
-use calib_offline::pinhole::adjustment::{Free, State, minimize};
-use calib_offline::pinhole::{
+use calib_estimate::adjust::Observations;
+use calib_estimate::init::focal_scan::start_camera;
+use calib_estimate::pinhole::adjustment::{Free, State, minimize};
+use calib_estimate::pinhole::{
     BrownCamera, Loss, PinholeRig, Refine, RigSettings, Settings, calibrate_rig, stereo,
 };
-use calib_offline::simulate::{MatchSet, OpticsKind, Scene, SceneSettings};
+use calib_rays::geometry::RigidTransform;
+use calib_simulate::{MatchSet, OpticsKind, Scene, SceneSettings};
 use common::against_truth::{MATCHES, errors_and_share, observations};
 use common::{Arguments, Result, print_table};
 use std::process::ExitCode;

@@ -7,7 +7,7 @@
 #[path = "../tests/common/ring_shots.rs"]
 mod ring_shots;
 
-use calib_offline::simulate::OpticsKind;
+use calib_simulate::OpticsKind;
 use rayon::prelude::*;
 use ring_shots::{Errors, Shot, located};
 use std::time::Instant;

@@ -4,7 +4,7 @@
 //! `cargo bench -p calib-offline --bench throughput`; `OpenCV` is measured if `python3` has `cv2` and numpy
 //! (`pip install opencv-python-headless numpy`).
 
-use calib_offline::pack::read_aligned;
+use calib_blob::pack::read_aligned;
 use nalgebra::Vector3;
 use ray_runtime::{PixelPoint, RayBlob};
 use std::fmt::Write as _;

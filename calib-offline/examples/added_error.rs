@@ -6,11 +6,11 @@
 //! ```
 
 use anyhow::{Context, bail};
-use calib_offline::matches::BlobSource;
-use calib_offline::matches::read_matches;
-use calib_offline::measure::{PointSource, RigSource};
-use calib_offline::pack::AlignedBytes;
+use calib_blob::matches::BlobSource;
+use calib_blob::matches::read_matches;
+use calib_blob::pack::AlignedBytes;
 use calib_offline::report::Calibration;
+use calib_rays::measure::{PointSource, RigSource};
 use ray_runtime::RayBlob;
 use std::path::PathBuf;
 

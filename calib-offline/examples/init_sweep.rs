@@ -6,12 +6,12 @@
 //!
 //! `ONLY` is part of a line's name ("fisheye", "640x480", "hand-held" ...).
 
-use calib_offline::adjust::Observations;
-use calib_offline::board::BoardSpec;
-use calib_offline::geometry::{RigidTransform, SensorSize, so3};
-use calib_offline::init::rig::start_rig;
-use calib_offline::init::screening::Finding;
-use calib_offline::simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
+use calib_estimate::adjust::Observations;
+use calib_estimate::init::rig::start_rig;
+use calib_estimate::init::screening::Finding;
+use calib_rays::board::BoardSpec;
+use calib_rays::geometry::{RigidTransform, SensorSize, so3};
+use calib_simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -133,7 +133,7 @@ struct Found {
 }
 
 /// Turns between poses against the truth: free of the choice of a camera's frame.
-fn judge(scene: &Scene) -> Result<Found, calib_offline::init::InitError> {
+fn judge(scene: &Scene) -> Result<Found, calib_estimate::init::InitError> {
     let sensors = scene.cameras.iter().map(CameraOptics::sensor).collect();
     let observations = Observations::new(scene.settings.board, sensors, &scene.observe_corners());
     let start = start_rig(&observations)?;

@@ -1,23 +1,23 @@
 //! What can go wrong, one variant per stage, each wrapping that stage's own error.
 
-use crate::alternating::AlternatingError;
-use crate::atomic_file::WriteError;
-use crate::dataset::{CornersError, ManifestError, SufficiencyError};
 use crate::demo::DemoError;
-use crate::detect::DetectError;
-use crate::detect::overlay::OverlayError;
-use crate::detect::ring_target::TargetError;
-use crate::detect::suspicion::LabelSuspicion;
 use crate::device::DeviceError;
 use crate::experiments::ExperimentError;
-use crate::export::ExportError;
-use crate::init::InitError;
-use crate::joint::EstimateError;
-use crate::matches::MatchesError;
-use crate::pack::PackError;
-use crate::pinhole::PinholeError;
 use crate::report::store::CalibrationError;
-use crate::simulate::SimulateError;
+use calib_blob::export::ExportError;
+use calib_blob::matches::MatchesError;
+use calib_blob::pack::PackError;
+use calib_estimate::alternating::AlternatingError;
+use calib_estimate::init::InitError;
+use calib_estimate::joint::EstimateError;
+use calib_estimate::pinhole::PinholeError;
+use calib_recording::atomic_file::WriteError;
+use calib_recording::dataset::{CornersError, ManifestError, SufficiencyError};
+use calib_recording::detect::DetectError;
+use calib_recording::detect::overlay::OverlayError;
+use calib_recording::detect::ring_target::TargetError;
+use calib_recording::detect::suspicion::LabelSuspicion;
+use calib_simulate::SimulateError;
 use std::convert::Infallible;
 use std::path::PathBuf;
 

@@ -5,20 +5,20 @@
 mod against_truth;
 
 use against_truth::{errors_and_share, observations, scene};
-use calib_offline::alternating::alternation::AlternationStop;
-use calib_offline::alternating::spread::SpreadError;
-use calib_offline::alternating::stage_circle::project_onto_circles;
-use calib_offline::alternating::start::StartKind;
-use calib_offline::alternating::{
+use calib_estimate::alternating::alternation::AlternationStop;
+use calib_estimate::alternating::spread::SpreadError;
+use calib_estimate::alternating::stage_circle::project_onto_circles;
+use calib_estimate::alternating::start::StartKind;
+use calib_estimate::alternating::{
     AlternatingError, AlternatingEstimate, AlternatingSettings, estimate,
 };
+use calib_estimate::init::rig::start_rig;
 use calib_offline::evaluate::truth::TruthErrors;
-use calib_offline::geometry::RigidTransform;
-use calib_offline::init::rig::start_rig;
 use calib_offline::pipeline::alternatingly::alternating_solution;
 use calib_offline::pipeline::solution::Task;
-use calib_offline::progress::Silent;
-use calib_offline::simulate::{MatchSet, OpticsKind, Scene};
+use calib_rays::geometry::RigidTransform;
+use calib_rays::progress::Silent;
+use calib_simulate::{MatchSet, OpticsKind, Scene};
 
 fn run(scene: &Scene, settings: &AlternatingSettings) -> AlternatingEstimate {
     let observations = observations(scene, &scene.observe_corners());
@@ -152,7 +152,7 @@ fn the_same_input_gives_the_same_bits_and_one_camera_is_enough() {
     });
     assert_eq!(a.rig_from_board, b.rig_from_board);
     assert_eq!(a.alternated.rms_mm, b.alternated.rms_mm);
-    let pixel = calib_offline::geometry::PixelPoint::new(640.0, 500.0);
+    let pixel = calib_rays::geometry::PixelPoint::new(640.0, 500.0);
     assert_eq!(
         a.cameras[0].ray(pixel).unwrap().ray,
         b.cameras[0].ray(pixel).unwrap().ray

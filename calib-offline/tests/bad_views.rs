@@ -2,10 +2,10 @@
 
 mod common;
 
-use calib_offline::init::InitError;
-use calib_offline::init::rig::start_rig;
-use calib_offline::observed::View;
-use calib_offline::simulate::OpticsKind;
+use calib_estimate::init::InitError;
+use calib_estimate::init::rig::start_rig;
+use calib_rays::observed::View;
+use calib_simulate::OpticsKind;
 use common::against_truth::{
     Named, hand_held, measure, named, observations, run_scene, run_views, scene,
 };
@@ -154,7 +154,7 @@ fn one_camera_alone() {
     let mut all = observations(&scene, &views);
     all.sensors.truncate(1);
     let start = start_rig(&all).unwrap();
-    let (estimate, findings) = calib_offline::joint::estimate_screened(&all, start).unwrap();
+    let (estimate, findings) = calib_estimate::joint::estimate_screened(&all, start).unwrap();
     assert_eq!(findings, []);
     let sigma_px = estimate.noise.variance_px2.sqrt();
     // 0.05 px, from 12 000 numbers.

@@ -4,10 +4,10 @@ mod common;
 
 use calib_offline::compare::contender::{CONTENDERS, Contender, Failure};
 use calib_offline::compare::{compare_methods, words};
-use calib_offline::dataset::Dataset;
-use calib_offline::detect::DetectSettings;
 use calib_offline::pipeline;
-use calib_offline::progress::Silent;
+use calib_rays::progress::Silent;
+use calib_recording::dataset::Dataset;
+use calib_recording::detect::DetectSettings;
 use common::{MANIFEST, contents, corners_csv, dataset, run};
 use serde_json::Value;
 use std::fs;

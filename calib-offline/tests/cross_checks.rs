@@ -7,10 +7,10 @@ use calib_offline::evaluate::central_model::CentralModel;
 use calib_offline::evaluate::cross_check;
 use calib_offline::evaluate::half_data::{HalfDataCheck, Skipped};
 use calib_offline::evaluate::working_volume::{Match, compare, matches_at, span};
-use calib_offline::field::Rig;
-use calib_offline::geometry::best_placement;
-use calib_offline::geometry::{Ray, nearest_point, triangulate_pair};
-use calib_offline::simulate::{OpticsKind, Scene};
+use calib_rays::field::Rig;
+use calib_rays::geometry::best_placement;
+use calib_rays::geometry::{Ray, nearest_point, triangulate_pair};
+use calib_simulate::{OpticsKind, Scene};
 use common::against_truth::{run_scene, run_views, scene};
 use common::halves::{checked, halves_of, halves_of_one_camera, names};
 
@@ -168,7 +168,7 @@ fn a_central_rig_loses_nothing_by_being_central() {
     else {
         panic!("{:?}", checks.central_model);
     };
-    assert!(gain < calib_offline::joint::choice::NEEDED_GAIN);
+    assert!(gain < calib_estimate::joint::choice::NEEDED_GAIN);
     assert!(
         checks
             .centrality

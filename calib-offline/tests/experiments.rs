@@ -2,15 +2,15 @@
 
 mod common;
 
-use calib_offline::board::BoardSpec;
-use calib_offline::dataset::Dataset;
 use calib_offline::experiments::figures::figures;
 use calib_offline::experiments::methods::Method;
 use calib_offline::experiments::tables::tables;
 use calib_offline::experiments::words::text;
 use calib_offline::experiments::{Evaluation, ExperimentSettings, evaluate};
-use calib_offline::progress::Silent;
-use calib_offline::simulate::{OpticsKind, OutputSettings, Scene, SceneSettings, write_dataset};
+use calib_rays::board::BoardSpec;
+use calib_rays::progress::Silent;
+use calib_recording::dataset::Dataset;
+use calib_simulate::{OpticsKind, OutputSettings, Scene, SceneSettings, write_dataset};
 use common::{MANIFEST, contents, corners_csv, dataset, run};
 use std::fs;
 use std::path::Path;

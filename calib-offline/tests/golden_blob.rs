@@ -4,13 +4,13 @@
 //! anew. That is right only if the packer was meant to change; a new format version gets a file
 //! of its own, and the old one stays.
 
-use calib_offline::field::spline::{Spline, SplineGrid};
-use calib_offline::field::uncertainty::packed;
-use calib_offline::field::{
+use calib_blob::pack::{AlignedBytes, PackSettings, Prefer, pack, read_aligned};
+use calib_rays::field::spline::{Spline, SplineGrid};
+use calib_rays::field::uncertainty::packed;
+use calib_rays::field::{
     BaseLens, CalibratedCamera, CoverageMask, PairUncertainty, Projection, RayField, Rig, SmoothMap,
 };
-use calib_offline::geometry::{PixelPoint, RigidTransform, SensorSize};
-use calib_offline::pack::{AlignedBytes, PackSettings, Prefer, pack, read_aligned};
+use calib_rays::geometry::{PixelPoint, RigidTransform, SensorSize};
 use nalgebra::{Matrix3, Matrix4, Vector2, Vector3};
 use ray_runtime::RayBlob;
 use ray_runtime::format::{self, HEADER_LEN, Header, QuantizedHeader, RECORD_LEN};

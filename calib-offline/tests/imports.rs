@@ -4,7 +4,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From the bottom up; a module may import those of its own layer and of layers before it.
-const LAYERS: [&[&str]; 12] = [
+const LAYERS: [&[&str]; 5] = [
+    &["device", "evaluate", "report"],
+    &["error"],
+    &["pipeline"],
+    &["demo", "compare", "experiments"],
+    &["cli"],
+]; 12] = [
     &[
         "numerics",
         "geometry",

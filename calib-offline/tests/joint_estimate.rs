@@ -3,8 +3,8 @@
 
 mod common;
 
-use calib_offline::adjust::StopReason;
-use calib_offline::simulate::OpticsKind;
+use calib_estimate::adjust::StopReason;
+use calib_simulate::OpticsKind;
 use common::against_truth::{measure, run_scene, scene};
 
 /// One draw of the noise moves the ratio by 0.005 (standard deviation, METHOD 9.3).

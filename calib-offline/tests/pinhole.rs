@@ -1,14 +1,14 @@
 //! The baseline against `OpenCV` on the same corners; how the figures came about is said in
 //! `data/opencv-figures/README.md`.
 
-use calib_offline::adjust::Observations;
-use calib_offline::board::BoardSpec;
-use calib_offline::dataset::Dataset;
-use calib_offline::dataset::corners::read_corners;
-use calib_offline::geometry::so3;
-use calib_offline::observed::View;
-use calib_offline::pinhole::{PinholeRig, Refine, RigSettings, calibrate_rig};
-use calib_offline::simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
+use calib_estimate::adjust::Observations;
+use calib_estimate::pinhole::{PinholeRig, Refine, RigSettings, calibrate_rig};
+use calib_rays::board::BoardSpec;
+use calib_rays::geometry::so3;
+use calib_rays::observed::View;
+use calib_recording::dataset::Dataset;
+use calib_recording::dataset::corners::read_corners;
+use calib_simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ const EXCESS_RMS: f64 = 4e-9;
 /// are those for exact intrinsics.
 const HELD_TOLERANCE_RMS: f64 = 1e-7;
 const HELD_TOLERANCE_SIGMA: f64 = 10.0 * TOLERANCE_SIGMA;
-/// The order of [`calib_offline::pinhole::BrownCamera::intrinsics`].
+/// The order of [`calib_estimate::pinhole::BrownCamera::intrinsics`].
 const NAMES: [&str; 9] = ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"];
 
 #[derive(Deserialize)]

@@ -3,13 +3,13 @@
 
 mod common;
 
-use calib_offline::field::PairUncertainty;
-use calib_offline::field::uncertainty::packed;
-use calib_offline::matches::BlobSource;
-use calib_offline::measure::{PointSource, RigSource};
-use calib_offline::pack::{AlignedBytes, PackSettings, pack};
+use calib_blob::matches::BlobSource;
+use calib_blob::pack::{AlignedBytes, PackSettings, pack};
 use calib_offline::report::Calibration;
-use calib_offline::simulate::{MatchSet, OpticsKind};
+use calib_rays::field::PairUncertainty;
+use calib_rays::field::uncertainty::packed;
+use calib_rays::measure::{PointSource, RigSource};
+use calib_simulate::{MatchSet, OpticsKind};
 use common::against_truth::{run_scene, scene};
 use common::{SENSOR, calibration, project, run};
 use nalgebra::{Matrix4, Vector3};

@@ -4,11 +4,11 @@
 #[path = "common/ring_shots.rs"]
 mod ring_shots;
 
-use calib_offline::dataset::TargetSpec;
-use calib_offline::dataset::image::GrayImage;
-use calib_offline::detect::ring_target::{Located, TargetRefusal, TargetSettings, locate};
-use calib_offline::geometry::{PixelPoint, SensorSize};
-use calib_offline::simulate::{OpticsKind, RenderSettings, Scene, SceneSettings};
+use calib_rays::geometry::{PixelPoint, SensorSize};
+use calib_recording::dataset::TargetSpec;
+use calib_recording::dataset::image::GrayImage;
+use calib_recording::detect::ring_target::{Located, TargetRefusal, TargetSettings, locate};
+use calib_simulate::{OpticsKind, RenderSettings, Scene, SceneSettings};
 use ring_shots::{Errors, Shot, located, target};
 use std::collections::BTreeMap;
 use std::sync::LazyLock;

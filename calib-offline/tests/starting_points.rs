@@ -2,9 +2,9 @@
 
 mod common;
 
-use calib_offline::init::InitError;
-use calib_offline::init::rig::start_rig;
-use calib_offline::simulate::OpticsKind;
+use calib_estimate::init::InitError;
+use calib_estimate::init::rig::start_rig;
+use calib_simulate::OpticsKind;
 use common::against_truth::{observations, scene};
 
 #[test]

@@ -2,9 +2,9 @@
 
 mod common;
 
-use calib_offline::dataset::{Dataset, load_markers};
-use calib_offline::detect::ring_target::{TargetSettings, join_markers, target_views};
-use calib_offline::progress::Silent;
+use calib_rays::progress::Silent;
+use calib_recording::dataset::{Dataset, load_markers};
+use calib_recording::detect::ring_target::{TargetSettings, join_markers, target_views};
 use common::{contents, run};
 use std::collections::BTreeMap;
 use std::fs;

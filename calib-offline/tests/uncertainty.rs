@@ -2,7 +2,7 @@
 
 mod common;
 
-use calib_offline::simulate::{MatchSet, OpticsKind};
+use calib_simulate::{MatchSet, OpticsKind};
 use common::against_truth::{Coverage, coverage, run_scene, scene};
 
 #[test]

@@ -6,18 +6,18 @@
     reason = "a fixture that cannot be made is a failed test"
 )]
 
-use calib_offline::board::BoardSpec;
-use calib_offline::dataset::Dataset;
+use calib_blob::pack::{AlignedBytes, PackSettings, Packed, pack};
 use calib_offline::demo::known::Pair;
 use calib_offline::device::on_wire;
 use calib_offline::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
-use calib_offline::geometry::SensorSize;
-use calib_offline::pack::{AlignedBytes, PackSettings, Packed, pack};
 use calib_offline::pipeline::{CalibrateSettings, Checked, calibrate_corners, corners};
-use calib_offline::progress::Silent;
 use calib_offline::report::Calibration;
 use calib_offline::report::facts::Facts;
-use calib_offline::simulate::{
+use calib_rays::board::BoardSpec;
+use calib_rays::geometry::SensorSize;
+use calib_rays::progress::Silent;
+use calib_recording::dataset::Dataset;
+use calib_simulate::{
     MatchSet, OpticsKind, OutputSettings, Scene, SceneSettings, TrueMatch, write_dataset,
 };
 use firmware_sim::client::DeviceClient;

@@ -2,12 +2,12 @@
 //! whose rays all meet, and with optics whose rays do not. The blob is flashed to the host's device and to
 //! the Cortex-M in QEMU, which keep it through a restart and give the host's bits.
 
-use calib_offline::adjust::residual::linearize;
+use calib_estimate::adjust::residual::linearize;
 use calib_offline::demo::DeviceCheck;
 use calib_offline::demo::device::check;
-use calib_offline::geometry::PixelPoint;
 use calib_offline::report::Calibration;
-use calib_offline::simulate::{MatchSet, OpticsKind, Scene};
+use calib_rays::geometry::PixelPoint;
+use calib_simulate::{MatchSet, OpticsKind, Scene};
 use firmware_sim::client::DeviceClient;
 use firmware_sim::flash_file::FlashFile;
 use firmware_sim::host::SimulatedDevice;

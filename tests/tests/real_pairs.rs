@@ -1,9 +1,9 @@
 //! Real images: boards measured by the runtime with a blob that was made without them.
 
-use calib_offline::dataset::Dataset;
+use calib_blob::pack::PackSettings;
 use calib_offline::demo::device::{check_simulated, corner_pairs};
 use calib_offline::demo::unseen::measure_unseen;
-use calib_offline::pack::PackSettings;
+use calib_recording::dataset::Dataset;
 use workspace_tests::{aligned, calibrate, data, packed, working_distance_mm};
 
 #[test]

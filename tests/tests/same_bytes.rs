@@ -1,7 +1,7 @@
 //! The same input gives the same bytes, whatever the number of threads.
 
-use calib_offline::dataset::Dataset;
-use calib_offline::simulate::OpticsKind;
+use calib_recording::dataset::Dataset;
+use calib_simulate::OpticsKind;
 use workspace_tests::{calibrate, packed, record, small_scene};
 
 /// `calibration.json` and `rig.rays`.

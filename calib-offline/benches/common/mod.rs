@@ -5,7 +5,7 @@ pub mod against_truth;
 #[path = "../../tests/common/halves.rs"]
 pub mod halves;
 
-use calib_offline::simulate::OpticsKind;
+use calib_simulate::OpticsKind;
 use clap::ValueEnum;
 use rayon::prelude::*;
 use std::fmt::Display;

@@ -4,11 +4,11 @@ use super::Outcome;
 use super::calibrate::say_what_is_used;
 use super::output::Console;
 use super::place::check_results_folder;
-use crate::atomic_file::{make_folder, write_set};
 use crate::compare::{Comparison, compare, words};
-use crate::dataset::Dataset;
 use crate::error::Error;
 use crate::pipeline;
+use calib_recording::atomic_file::{make_folder, write_set};
+use calib_recording::dataset::Dataset;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -79,7 +79,7 @@ pub fn run(args: &CompareArgs, console: &Console) -> Result<Outcome, Error> {
     }
     let dataset = Dataset::load(&args.dataset)?;
     say_what_is_used(&dataset, console);
-    let detect = crate::detect::DetectSettings::default();
+    let detect = calib_recording::detect::DetectSettings::default();
     let corners = pipeline::corners(&dataset, &detect, console.progress())?;
     let folds = usize::from(args.folds);
     let comparison = compare(&dataset, &corners, folds, console.progress())?;

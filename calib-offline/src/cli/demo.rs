@@ -3,9 +3,6 @@
 use super::Outcome;
 use super::calibrate::{FILES, Written, pack_settings, say_what_is_used, write_results};
 use super::output::Console;
-use crate::adjust::Observations;
-use crate::atomic_file::{self, check_folder};
-use crate::dataset::Dataset;
 use crate::demo::device::{check_cortex_m, check_simulated, corner_pairs};
 use crate::demo::known::measure_known;
 use crate::demo::page::{Entry, page};
@@ -13,11 +10,14 @@ use crate::demo::unseen::measure_unseen;
 use crate::demo::{DemoError, DeviceCheck, Measured, words};
 use crate::error::{Error, UsageError};
 use crate::evaluate::Folds;
-use crate::pack::AlignedBytes;
 use crate::pipeline::{self, CalibrateSettings, Checked};
 use crate::report::facts::Facts;
 use crate::report::record::Grade;
 use crate::report::{BlobFacts, text};
+use calib_blob::pack::AlignedBytes;
+use calib_estimate::adjust::Observations;
+use calib_recording::atomic_file::{self, check_folder};
+use calib_recording::dataset::Dataset;
 use clap::Args;
 use ray_runtime::RayBlob;
 use serde::Serialize;
@@ -198,7 +198,7 @@ fn measure(
 }
 
 fn read(file: &Path) -> Result<AlignedBytes, Error> {
-    crate::pack::read_aligned(file).map_err(|source| {
+    calib_blob::pack::read_aligned(file).map_err(|source| {
         Error::Blob(crate::error::BlobError::Read {
             file: file.to_owned(),
             source,

@@ -1,13 +1,13 @@
 //! `detect`: from a dataset's images to labelled corners, with a verdict on every image.
 
-use crate::dataset::Dataset;
-use crate::detect::overlay::{OverlayError, write_all};
-use crate::detect::verdict::{ImageFigures, ImageVerdict, Outcome};
-use crate::detect::{
+use calib_rays::observed::View;
+use calib_rays::progress::Progress;
+use calib_recording::dataset::Dataset;
+use calib_recording::detect::overlay::{OverlayError, write_all};
+use calib_recording::detect::verdict::{ImageFigures, ImageVerdict, Outcome};
+use calib_recording::detect::{
     DetectError, DetectSettings, Detection, PairCheck, TurnedImage, detect_dataset,
 };
-use crate::observed::View;
-use crate::progress::Progress;
 use clap::Args;
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -280,10 +280,10 @@ impl From<&ImageFigures> for FiguresObject {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::board::BoardSpec;
-    use crate::dataset::CameraSpec;
-    use crate::geometry::SensorSize;
-    use crate::progress::Silent;
+    use calib_rays::board::BoardSpec;
+    use calib_rays::geometry::SensorSize;
+    use calib_rays::progress::Silent;
+    use calib_recording::dataset::CameraSpec;
 
     #[test]
     fn a_refused_image_is_named_in_words_and_in_json_and_framed_in_its_overlay() {

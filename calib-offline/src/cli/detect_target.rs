@@ -2,14 +2,14 @@
 //! verdict on every image.
 
 use super::detect::DetectArgs;
-use crate::dataset::Dataset;
-use crate::detect::ring_target::{
+use crate::error::Error;
+use calib_rays::observed::View;
+use calib_rays::progress::Progress;
+use calib_recording::dataset::Dataset;
+use calib_recording::detect::ring_target::{
     TargetDetection, TargetError, TargetFigures, TargetImage, TargetSettings, detect_target,
     overlay::write_all,
 };
-use crate::error::Error;
-use crate::observed::View;
-use crate::progress::Progress;
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::PathBuf;

@@ -2,9 +2,9 @@
 
 use super::Outcome;
 use super::output::Console;
-use crate::dataset::identity::hex;
 use crate::device::{DeviceError, DeviceState, connect, state_in_words};
 use crate::error::{Error, UsageError};
+use calib_recording::dataset::identity::hex;
 use clap::{Args, Subcommand};
 use firmware_sim::client::DeviceClient;
 use serde::Serialize;

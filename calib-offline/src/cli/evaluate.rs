@@ -2,14 +2,14 @@
 
 use super::Outcome;
 use super::output::Console;
-use crate::atomic_file::{check_folder, check_writable, make_folder, write_set};
-use crate::dataset::Dataset;
 use crate::error::Error;
 use crate::experiments::figures::figures;
 use crate::experiments::paper::evaluate_set_up;
 use crate::experiments::tables::tables;
 use crate::experiments::words::{COMPARABLE, PUBLISHED_DEVIATION_MM, PUBLISHED_MEAN_MM, text};
 use crate::experiments::{Evaluation, ExperimentSettings, evaluate};
+use calib_recording::atomic_file::{check_folder, check_writable, make_folder, write_set};
+use calib_recording::dataset::Dataset;
 use clap::Args;
 use serde::Serialize;
 use std::path::{Path, PathBuf};

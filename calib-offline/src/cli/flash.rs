@@ -3,10 +3,10 @@
 use super::Outcome;
 use super::output::Console;
 use super::rig_file::{RigFile, open};
-use crate::dataset::identity::hex;
 use crate::device::{DeviceError, connect};
 use crate::error::{BlobError, Error, UsageError};
-use crate::progress::Progress;
+use calib_rays::progress::Progress;
+use calib_recording::dataset::identity::hex;
 use clap::Args;
 use firmware_sim::client::{FlashOptions, FlashProgress};
 use firmware_sim::protocol::Signature;

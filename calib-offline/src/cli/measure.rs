@@ -5,15 +5,15 @@ use super::Outcome;
 use super::output::Console;
 use super::place::check_file;
 use super::rig_file::{RigFile, open};
-use crate::atomic_file::{PendingFile, WriteError};
 use crate::device::{DeviceSource, connect};
 use crate::error::{Error, UsageError};
-use crate::matches::{
+use crate::report::text::short;
+use calib_blob::matches::{
     BlobSource, MatchesError, MeasureSummary, POINTS_HEADER, StreamError, measure_batches,
     measure_stream,
 };
-use crate::measure::{PointSource, RigSource};
-use crate::report::text::short;
+use calib_rays::measure::{PointSource, RigSource};
+use calib_recording::atomic_file::{PendingFile, WriteError};
 use clap::Args;
 use firmware_sim::client::DEFAULT_TIMEOUT;
 use serde::Serialize;

@@ -3,7 +3,7 @@
 
 use super::progress::Bars;
 use super::settings::{Narration, Settings};
-use crate::progress::Progress;
+use calib_rays::progress::Progress;
 use serde::Serialize;
 use std::io::Write;
 

@@ -4,13 +4,13 @@ use super::Outcome;
 use super::calibrate::{BLOB_MAX_ERROR_PX, pack_settings};
 use super::output::Console;
 use super::place::check_file;
-use crate::atomic_file;
 use crate::error::Error;
-use crate::pack::{
-    CurvePoint, Deviation, LOOSEST_PX, PackSettings, Prefer, pack, pack_within_bytes,
-};
 use crate::report::Calibration;
 use crate::report::text::short;
+use calib_blob::pack::{
+    CurvePoint, Deviation, LOOSEST_PX, PackSettings, Prefer, pack, pack_within_bytes,
+};
+use calib_recording::atomic_file;
 use clap::{Args, ValueEnum};
 use ray_runtime::format::{Form, MAGIC};
 use serde::Serialize;

@@ -1,7 +1,7 @@
 //! Progress for people: bars on a terminal, plain lines in a log.
 
 use super::settings::{Narration, Settings};
-use crate::progress::Progress;
+use calib_rays::progress::Progress;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::Write;
 use std::sync::{Mutex, MutexGuard, PoisonError};

@@ -5,10 +5,10 @@ use super::detect::{DetectArgs, DetectCommandError, run as run_detect};
 use super::detect_target::run as run_detect_target;
 use super::output::Console;
 use super::simulate::{SimulateArgs, SimulateSummary, run as run_simulate};
-use crate::atomic_file::{check_folder, check_place};
-use crate::dataset::{Dataset, SufficiencyError, write_corners};
 use crate::error::{Error, UsageError};
 use crate::report::text::short;
+use calib_recording::atomic_file::{check_folder, check_place};
+use calib_recording::dataset::{Dataset, SufficiencyError, write_corners};
 use serde::Serialize;
 use std::path::Path;
 

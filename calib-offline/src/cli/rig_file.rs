@@ -1,8 +1,8 @@
 //! A rig from a file: a blob or a calibration, told apart by how the file begins.
 
 use crate::error::{BlobError, Error, UsageError};
-use crate::pack::AlignedBytes;
 use crate::report::Calibration;
+use calib_blob::pack::AlignedBytes;
 use ray_runtime::RayBlob;
 use ray_runtime::format::MAGIC;
 use std::path::Path;

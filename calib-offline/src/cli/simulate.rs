@@ -1,11 +1,11 @@
 //! `calib-offline simulate`: a dataset with known truth.
 
-use crate::geometry::SensorSize;
-use crate::simulate::output::write_dataset;
-use crate::simulate::{
+use calib_rays::geometry::SensorSize;
+use calib_simulate::output::write_dataset;
+use calib_simulate::{
     ImageDepth, OpticsKind, OutputSettings, RenderSettings, Scene, SceneSettings,
 };
-pub use crate::simulate::{SimulateError, SimulateSummary};
+pub use calib_simulate::{SimulateError, SimulateSummary};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 

@@ -1,14 +1,14 @@
 //! Boards that no method saw, judged on the corners that every method can answer: a method that
 //! refuses the difficult part of the image would else look the better for it.
 
-use crate::adjust::Observations;
-use crate::adjust::observations::{ObservedCorner, ViewBlock};
 use crate::evaluate::held_out::{BoardErrors, Fold, measure_boards};
 use crate::evaluate::resection::residuals_with_free_pose;
-use crate::field::Rig;
-use crate::geometry::PixelPoint;
-use crate::measure::RigSource;
-use crate::observed::Corner;
+use calib_estimate::adjust::Observations;
+use calib_estimate::adjust::observations::{ObservedCorner, ViewBlock};
+use calib_rays::field::Rig;
+use calib_rays::geometry::PixelPoint;
+use calib_rays::measure::RigSource;
+use calib_rays::observed::Corner;
 use nalgebra::Vector2;
 
 /// Errors of one method on one board.
@@ -125,9 +125,9 @@ fn score_board(folds: &[&Fold], board: &Observations) -> Vec<BoardScore> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::board::BoardShape;
-    use crate::pinhole::{RigSettings, calibrate_rig};
-    use crate::simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
+    use calib_estimate::pinhole::{RigSettings, calibrate_rig};
+    use calib_rays::board::BoardShape;
+    use calib_simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
 
     #[test]
     fn a_method_gains_nothing_by_refusing_a_part_of_the_image() {

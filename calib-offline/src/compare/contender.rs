@@ -1,19 +1,19 @@
 //! The methods that are compared: each gives a rig from the same observations. A further method is
 //! one more entry of [`CONTENDERS`].
 
-use crate::adjust::Observations;
-use crate::adjust::robust::{relative_weights, reweight};
-use crate::board::BoardShape;
 use crate::error::Error;
 use crate::evaluate::held_out::Estimated;
-use crate::evaluate::reprojection::residuals;
-use crate::field::Rig;
-use crate::geometry::RigidTransform;
-use crate::init::rig::start_rig;
-use crate::joint::{Estimate, estimate_screened};
-use crate::pinhole::{Loss, PinholeError, RigSettings, Settings, calibrate_rig};
 use crate::pipeline::alternatingly::{estimate_alternating, estimate_rig};
 use crate::pipeline::jointly::estimate_joint;
+use calib_estimate::adjust::Observations;
+use calib_estimate::adjust::robust::{relative_weights, reweight};
+use calib_estimate::init::rig::start_rig;
+use calib_estimate::joint::{Estimate, estimate_screened};
+use calib_estimate::pinhole::{Loss, PinholeError, RigSettings, Settings, calibrate_rig};
+use calib_estimate::reprojection::residuals;
+use calib_rays::board::BoardShape;
+use calib_rays::field::Rig;
+use calib_rays::geometry::RigidTransform;
 use std::collections::BTreeMap;
 
 /// What all methods are given: the views that agree with each other, as the joint estimate finds

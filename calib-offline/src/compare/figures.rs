@@ -4,16 +4,16 @@ use super::boards::{BoardScore, FoldScores, score_fold};
 use super::contender::Fitted;
 use super::record::{HeldOutFigures, MethodFigures, Ratios, Training, TruthFigures};
 use super::{Run, bootstrap};
-use crate::adjust::Observations;
 use crate::evaluate::Folds;
 use crate::evaluate::held_out::{BoardErrors, Fold};
-use crate::evaluate::reprojection::residuals;
 use crate::evaluate::truth::{PointWithTruth, compare_with_truth};
-use crate::field::Rig;
-use crate::geometry::RigidTransform;
-use crate::matches::KnownMatches;
-use crate::measure::{PointSource, RigSource};
-use crate::numerics::rms;
+use calib_blob::matches::KnownMatches;
+use calib_estimate::adjust::Observations;
+use calib_estimate::reprojection::residuals;
+use calib_rays::field::Rig;
+use calib_rays::geometry::RigidTransform;
+use calib_rays::measure::{PointSource, RigSource};
+use calib_rays::numerics::rms;
 use nalgebra::Vector3;
 
 /// Median distance of the boards' middles from the first camera, mm.
@@ -229,7 +229,7 @@ pub(super) fn add_truth(methods: &mut [MethodFigures], runs: &[Run], known: &[Kn
                 .zip(&known.truth)
                 .enumerate()
                 .filter(|(k, _)| is_common(*k))
-                .filter_map(|(_, (point, truth))| Some(truth.with((*point)?)))
+                .filter_map(|(_, (point, truth))| Some(PointWithTruth::new((*point)?, truth)))
                 .collect();
             figures.truth.push(TruthFigures {
                 file: known.file.clone(),

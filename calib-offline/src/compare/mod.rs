@@ -13,15 +13,15 @@ pub mod words;
 
 pub use record::{Comparison, MethodFigures, SCHEMA};
 
-use crate::adjust::Observations;
-use crate::dataset::identity::input_sha256;
-use crate::dataset::{Dataset, stage};
 use crate::error::Error;
 use crate::evaluate::{Folds, estimate_folds};
-use crate::matches::read_known;
 use crate::pipeline::solution::folds_wanted;
 use crate::pipeline::{Corners, Method, camera_names, explained, offered};
-use crate::progress::Progress;
+use calib_blob::matches::read_known;
+use calib_estimate::adjust::Observations;
+use calib_rays::progress::Progress;
+use calib_recording::dataset::identity::input_sha256;
+use calib_recording::dataset::{Dataset, stage};
 use contender::{CONTENDERS, Contender, Failure, Fitted, Shared};
 use figures::{add_held_out, add_training, add_truth, without_outliers, working_distance_mm};
 use std::time::{Duration, Instant};

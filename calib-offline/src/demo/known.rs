@@ -1,8 +1,8 @@
 //! Matches of a simulated dataset, measured by the device's code and compared with their truth.
 
 use crate::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
-use crate::matches::{BlobSource, MatchesError, read_known};
-use crate::measure::{PointSource, Sighting};
+use calib_blob::matches::{BlobSource, MatchesError, read_known};
+use calib_rays::measure::{PointSource, Sighting};
 use nalgebra::Vector3;
 use ray_runtime::RayBlob;
 use serde::Serialize;
@@ -45,7 +45,10 @@ pub fn measure_known(
             .zip(&known.truth)
             .filter_map(|(sightings, truth)| {
                 let found = source.point(sightings).ok()?;
-                Some(truth.with(Vector3::from(found.point_mm.map(f64::from))))
+                Some(PointWithTruth::new(
+                    Vector3::from(found.point_mm.map(f64::from)),
+                    truth,
+                ))
             })
             .collect();
         results.push(KnownPoints {

@@ -1,14 +1,14 @@
 //! Boards that the calibration never saw, measured by the device's code through a blob.
 
 use super::DemoError;
-use crate::adjust::Observations;
 use crate::error::Error;
 use crate::evaluate::Folds;
 use crate::evaluate::held_out::{BoardErrors, Fold, measure_boards};
-use crate::in_order;
-use crate::matches::BlobSource;
-use crate::numerics::rms;
-use crate::pack::{AlignedBytes, PackSettings, pack_nearest};
+use calib_blob::matches::BlobSource;
+use calib_blob::pack::{AlignedBytes, PackSettings, pack_nearest};
+use calib_estimate::adjust::Observations;
+use calib_rays::in_order;
+use calib_rays::numerics::rms;
 use ray_runtime::RayBlob;
 use serde::Serialize;
 

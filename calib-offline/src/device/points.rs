@@ -1,7 +1,7 @@
 //! A device as a source of points.
 
 use super::DeviceError;
-use crate::measure::{Answers, BatchSource, Point, Sighting, Status};
+use calib_rays::measure::{Answers, BatchSource, Point, Sighting, Status};
 use firmware_sim::client::DeviceClient;
 use firmware_sim::protocol::{self, Match};
 use ray_runtime::{LookupError, MeasureError};

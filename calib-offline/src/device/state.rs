@@ -1,6 +1,6 @@
 //! What a device says of itself, as an object for JSON.
 
-use crate::dataset::identity::hex;
+use calib_recording::dataset::identity::hex;
 use firmware_sim::health::{GapReport, Verdict};
 use firmware_sim::protocol::{self, CameraStatus, Hello, Status};
 use serde::Serialize;

@@ -1,8 +1,8 @@
 //! What would be lost if every camera were taken to have one center of projection.
 
 use super::working_volume::{Match, PointDifference, compare};
-use crate::field::Rig;
-use crate::joint::{Alternative, Choice, Estimate};
+use calib_estimate::joint::{Alternative, Choice, Estimate};
+use calib_rays::field::Rig;
 use serde::{Deserialize, Serialize};
 
 /// The cost of a central model.

@@ -1,7 +1,7 @@
 //! How far a camera is from having one center of projection, in millimeters.
 
-use crate::field::{CalibratedCamera, RayField};
-use crate::geometry::{PixelPoint, Ray, nearest_point};
+use calib_rays::field::{CalibratedCamera, RayField};
+use calib_rays::geometry::{PixelPoint, Ray, nearest_point};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -65,8 +65,8 @@ fn over(field: &RayField, pixels: &[PixelPoint]) -> Centrality {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::{BaseLens, Projection, SmoothMap};
-    use crate::geometry::SensorSize;
+    use calib_rays::field::{BaseLens, Projection, SmoothMap};
+    use calib_rays::geometry::SensorSize;
     use nalgebra::Vector2;
 
     fn narrow_lens(offset: impl Fn(usize) -> Vector2<f64>) -> Centrality {

@@ -4,8 +4,8 @@ use super::central_model::{CentralModel, central_model};
 use super::centrality::{Centrality, centrality};
 use super::half_data::{HalfDataCheck, Skipped, estimate_halves};
 use super::working_volume::{matches_at, span};
-use crate::field::Rig;
-use crate::joint::Estimate;
+use calib_estimate::joint::Estimate;
+use calib_rays::field::Rig;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 

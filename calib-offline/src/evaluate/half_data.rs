@@ -14,10 +14,10 @@
 //! ports, 0.72 with weak and 0.60 with strong local distortion.
 
 use super::working_volume::{Match, compare, lattice, matches_at};
-use crate::field::{RayField, Rig, transport};
-use crate::geometry::PixelPoint;
-use crate::joint::Estimate;
-use crate::joint::point_covariance::{across_motions, without_motions};
+use calib_estimate::joint::Estimate;
+use calib_estimate::joint::point_covariance::{across_motions, without_motions};
+use calib_rays::field::{RayField, Rig, transport};
+use calib_rays::geometry::PixelPoint;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

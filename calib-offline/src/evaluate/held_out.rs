@@ -6,14 +6,14 @@
 
 use super::measured_board::MeasuredBoard;
 use super::resection::residuals_with_free_pose;
-use crate::adjust::Observations;
-use crate::adjust::observations::ViewBlock;
-use crate::board::BoardShape;
-use crate::field::Rig;
-use crate::geometry::PixelPoint;
-use crate::measure::{Number, PointSource, RigSource, Sighting, Status};
-use crate::observed::Corner;
-use crate::progress::Progress;
+use calib_estimate::adjust::Observations;
+use calib_estimate::adjust::observations::ViewBlock;
+use calib_rays::board::BoardShape;
+use calib_rays::field::Rig;
+use calib_rays::geometry::PixelPoint;
+use calib_rays::measure::{Number, PointSource, RigSource, Sighting, Status};
+use calib_rays::observed::Corner;
+use calib_rays::progress::Progress;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

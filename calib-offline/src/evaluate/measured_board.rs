@@ -1,7 +1,7 @@
 //! A board measured with the rig: how far its triangulated corners are from where they must be.
 
-use crate::board::BoardSpec;
-use crate::geometry::best_placement;
+use calib_rays::board::BoardSpec;
+use calib_rays::geometry::best_placement;
 use nalgebra::Vector3;
 use std::collections::HashMap;
 
@@ -54,7 +54,7 @@ impl MeasuredBoard {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{RigidTransform, so3};
+    use calib_rays::geometry::{RigidTransform, so3};
 
     #[test]
     fn a_scaled_board_shows_its_scale_and_a_moved_one_nothing() {

@@ -7,7 +7,6 @@ pub mod cross_checks;
 pub mod half_data;
 pub mod held_out;
 pub mod measured_board;
-pub mod reprojection;
 pub mod resection;
 pub mod stage_axis;
 pub mod truth;

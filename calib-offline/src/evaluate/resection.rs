@@ -1,11 +1,11 @@
 //! Where a board is, seen by one calibrated camera: for residuals of boards it never saw.
 
-use crate::adjust::residual::linearize;
-use crate::board::{BoardShape, BoardSpec};
-use crate::field::RayField;
-use crate::geometry::so3::skew;
-use crate::init::bearing_pose::bearing_pose;
-use crate::observed::Corner;
+use calib_estimate::adjust::residual::linearize;
+use calib_estimate::init::bearing_pose::bearing_pose;
+use calib_rays::board::{BoardShape, BoardSpec};
+use calib_rays::field::RayField;
+use calib_rays::geometry::so3::skew;
+use calib_rays::observed::Corner;
 use nalgebra::{Matrix2x6, Matrix6, Vector2, Vector6};
 
 /// Gauss-Newton steps: the start is good to a pixel, convergence is quadratic.

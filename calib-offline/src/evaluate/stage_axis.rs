@@ -1,8 +1,8 @@
 //! The axis of the rotation stage, from the estimated poses alone: boards that turned about one
 //! axis differ by rotations about it, and the axis is where those rotations leave points at rest.
 
-use crate::geometry::{RigidTransform, so3};
 use crate::report::record::{PoseRecord, StageAxis};
+use calib_rays::geometry::{RigidTransform, so3};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 

@@ -1,8 +1,9 @@
 //! Measured points against where they truly are, beside what a perfect calibration would do.
 
-use crate::geometry::best_placement;
+use calib_blob::matches::TruePoint;
+use calib_rays::geometry::best_placement;
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// A measured point with its truth, one frame for all three, mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,35 +16,13 @@ pub struct PointWithTruth {
     pub oracle_mm: Vector3<f64>,
 }
 
-/// Where a point is, and what the true rays of its pixels give: a row of a table of true points, whose
-/// other columns are for other uses. Datum frame, mm.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-pub struct TruePoint {
-    x: f64,
-    y: f64,
-    z: f64,
-    x_oracle: f64,
-    y_oracle: f64,
-    z_oracle: f64,
-}
-
-impl TruePoint {
-    /// Where it is.
-    pub fn true_mm(&self) -> Vector3<f64> {
-        Vector3::new(self.x, self.y, self.z)
-    }
-
-    /// See [`PointWithTruth::oracle_mm`].
-    pub fn oracle_mm(&self) -> Vector3<f64> {
-        Vector3::new(self.x_oracle, self.y_oracle, self.z_oracle)
-    }
-
-    /// With what was measured of it.
-    pub fn with(&self, measured_mm: Vector3<f64>) -> PointWithTruth {
-        PointWithTruth {
+impl PointWithTruth {
+    /// What was measured of a point whose truth is known.
+    pub fn new(measured_mm: Vector3<f64>, truth: &TruePoint) -> Self {
+        Self {
             measured_mm,
-            true_mm: self.true_mm(),
-            oracle_mm: self.oracle_mm(),
+            true_mm: truth.true_mm(),
+            oracle_mm: truth.oracle_mm(),
         }
     }
 }

@@ -1,8 +1,8 @@
 //! Points all over the volume that a rig was calibrated in, to compare what rigs make of them.
 
-use crate::field::{CoverageMask, Rig};
-use crate::geometry::best_placement;
-use crate::geometry::{PixelPoint, RigidTransform};
+use calib_rays::field::{CoverageMask, Rig};
+use calib_rays::geometry::best_placement;
+use calib_rays::geometry::{PixelPoint, RigidTransform};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -131,7 +131,7 @@ pub fn compare(first: &Rig, second: &Rig, matches: &[Match]) -> Option<Compared>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::SensorSize;
+    use calib_rays::geometry::SensorSize;
 
     #[test]
     fn a_small_calibrated_area_has_as_many_pixels_as_a_large_one() {

@@ -2,10 +2,10 @@
 //! recording has none; the truth of a simulated dataset says where cameras would see them.
 
 use super::ExperimentError;
-use crate::board::BoardSpec;
-use crate::dataset::Dataset;
-use crate::geometry::PixelPoint;
-use crate::simulate::{CameraOptics, Scene, SceneSettings};
+use calib_rays::board::BoardSpec;
+use calib_rays::geometry::PixelPoint;
+use calib_recording::dataset::Dataset;
+use calib_simulate::{CameraOptics, Scene, SceneSettings};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -2,13 +2,14 @@
 
 use super::methods::{Method, MethodRun};
 use super::target::{measure_all, middle};
-use crate::dataset::Dataset;
 use crate::error::Error;
-use crate::evaluate::truth::{PointWithTruth, TruePoint, TruthErrors, compare_with_truth};
-use crate::geometry::{PixelPoint, best_placement};
-use crate::matches::read_known;
-use crate::numerics::rms;
+use crate::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
 use crate::pipeline::camera_names;
+use calib_blob::matches::TruePoint;
+use calib_blob::matches::read_known;
+use calib_rays::geometry::{PixelPoint, best_placement};
+use calib_rays::numerics::rms;
+use calib_recording::dataset::Dataset;
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -97,7 +98,7 @@ fn experiment(
         // A method that does not decide which points are common may lack some of them.
         let paired: Vec<PointWithTruth> = common
             .iter()
-            .filter_map(|k| Some(truth[*k].with(points[*k]?)))
+            .filter_map(|k| Some(PointWithTruth::new(points[*k]?, &truth[*k])))
             .collect();
         let from: Vec<Vector3<f64>> = paired.iter().map(|p| p.measured_mm).collect();
         let to: Vec<Vector3<f64>> = paired.iter().map(|p| p.true_mm).collect();

@@ -1,13 +1,13 @@
 //! The three methods on the same corners, each as something that measures points.
 
 use super::MethodOutcome;
-use crate::adjust::Observations;
-use crate::alternating::{self, AlternatingEstimate, AlternatingSettings};
 use crate::compare::contender::Shared;
-use crate::field::Rig;
-use crate::geometry::{PixelPoint, Ray, RigidTransform, triangulate_pair, triangulate_rays};
-use crate::init::rig::start_rig;
-use crate::pinhole::{PinholeRig, RigSettings, calibrate_rig};
+use calib_estimate::adjust::Observations;
+use calib_estimate::alternating::{self, AlternatingEstimate, AlternatingSettings};
+use calib_estimate::init::rig::start_rig;
+use calib_estimate::pinhole::{PinholeRig, RigSettings, calibrate_rig};
+use calib_rays::field::Rig;
+use calib_rays::geometry::{PixelPoint, Ray, RigidTransform, triangulate_pair, triangulate_rays};
 use nalgebra::Vector3;
 use serde::Serialize;
 

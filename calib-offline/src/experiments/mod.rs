@@ -24,13 +24,13 @@ pub mod target;
 pub mod words;
 
 use crate::compare::contender::Shared;
-use crate::dataset::Dataset;
-use crate::dataset::corners::poses;
-use crate::dataset::stage::{entry, placements};
-use crate::detect::DetectSettings;
 use crate::error::Error;
 use crate::pipeline::{self, camera_names, explained, offered};
-use crate::progress::Progress;
+use calib_rays::progress::Progress;
+use calib_recording::dataset::Dataset;
+use calib_recording::dataset::corners::poses;
+use calib_recording::dataset::stage::{entry, placements};
+use calib_recording::detect::DetectSettings;
 use methods::{Method, MethodRun};
 use serde::Serialize;
 use std::path::PathBuf;

@@ -3,10 +3,10 @@
 //! noise; the target's markers are found in rendered images.
 
 use super::{Evaluation, ExperimentSettings, evaluate};
-use crate::dataset::Dataset;
 use crate::error::Error;
-use crate::progress::Progress;
-use crate::simulate::{
+use calib_rays::progress::Progress;
+use calib_recording::dataset::Dataset;
+use calib_simulate::{
     OpticsKind, OutputSettings, Scene, SceneSettings, SimulateError, write_dataset,
 };
 

@@ -3,14 +3,14 @@
 
 use super::ExperimentSettings;
 use super::auxiliary::{SIDE_MM, seen_markers};
-use crate::adjust::Observations;
-use crate::adjust::observations::ViewBlock;
-use crate::alternating::AlternatingSettings;
-use crate::alternating::plane_map::{NetworkSettings, TrainingSet};
-use crate::alternating::spread::sweep;
-use crate::geometry::PixelPoint;
-use crate::numerics::rms;
-use crate::simulate::Scene;
+use calib_estimate::adjust::Observations;
+use calib_estimate::adjust::observations::ViewBlock;
+use calib_estimate::alternating::AlternatingSettings;
+use calib_estimate::alternating::plane_map::{NetworkSettings, TrainingSet};
+use calib_estimate::alternating::spread::sweep;
+use calib_rays::geometry::PixelPoint;
+use calib_rays::numerics::rms;
+use calib_simulate::Scene;
 use rayon::prelude::*;
 use serde::Serialize;
 

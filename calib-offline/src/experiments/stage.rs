@@ -1,11 +1,11 @@
 //! Angle of each pose about the stage's axis against the dial (publication, Fig. 8).
 
 use super::methods::{Calibrated, Method, MethodRun, calibrated};
-use crate::dataset::stage::StageEntry;
 use crate::evaluate::fit_stage_axes;
-use crate::geometry::{RigidTransform, so3};
-use crate::numerics::rms;
 use crate::report::record::PoseRecord;
+use calib_rays::geometry::{RigidTransform, so3};
+use calib_rays::numerics::rms;
+use calib_recording::dataset::stage::StageEntry;
 use nalgebra::Vector3;
 use serde::Serialize;
 

@@ -1,6 +1,6 @@
 //! Mean, spread and size of errors.
 
-use crate::numerics::rms;
+use calib_rays::numerics::rms;
 use serde::Serialize;
 
 /// Of errors, mm.

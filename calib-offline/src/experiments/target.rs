@@ -4,16 +4,16 @@
 use super::ExperimentError;
 use super::methods::{Calibrated, Method, MethodRun, Pixels, calibrated};
 use super::statistics::ErrorStatistics;
-use crate::board::BoardSpec;
-use crate::dataset::{Dataset, TargetSpec};
-use crate::detect::ring_target::{
-    MarkerMatch, TargetError, TargetSettings, join_markers, target_views,
-};
 use crate::error::Error;
 use crate::evaluate::measured_board::MeasuredBoard;
-use crate::geometry::best_placement;
-use crate::numerics::rms;
-use crate::progress::Progress;
+use calib_rays::board::BoardSpec;
+use calib_rays::geometry::best_placement;
+use calib_rays::numerics::rms;
+use calib_rays::progress::Progress;
+use calib_recording::dataset::{Dataset, TargetSpec};
+use calib_recording::detect::ring_target::{
+    MarkerMatch, TargetError, TargetSettings, join_markers, target_views,
+};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -103,7 +103,7 @@ pub struct Measured<'a> {
 /// the others are judged by.
 pub fn measure_all<'a>(
     runs: &'a [MethodRun],
-    items: &[Vec<(usize, crate::geometry::PixelPoint)>],
+    items: &[Vec<(usize, calib_rays::geometry::PixelPoint)>],
 ) -> Measured<'a> {
     use rayon::prelude::*;
     let methods: Vec<_> = calibrated(runs)

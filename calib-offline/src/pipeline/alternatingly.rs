@@ -2,20 +2,22 @@
 
 use super::Method;
 use super::solution::{FoldError, Solution, Solved, Task, folds_wanted};
-use crate::adjust::Observations;
-use crate::adjust::robust::{relative_weights, reweight};
-use crate::alternating::alternation::{Alternated, AlternationStop};
-use crate::alternating::field_rig::FieldRig;
-use crate::alternating::{AlternatingError, AlternatingEstimate, AlternatingSettings, estimate};
-use crate::board::BoardShape;
 use crate::error::Error;
 use crate::evaluate::estimate_folds;
 use crate::evaluate::held_out::Estimated;
-use crate::evaluate::reprojection::residuals;
-use crate::field::{BaseLens, Rig};
-use crate::init::rig::{RigStart, start_rig};
-use crate::progress::Progress;
 use crate::report::record::AlternatingRecord;
+use calib_estimate::adjust::Observations;
+use calib_estimate::adjust::robust::{relative_weights, reweight};
+use calib_estimate::alternating::alternation::{Alternated, AlternationStop};
+use calib_estimate::alternating::field_rig::FieldRig;
+use calib_estimate::alternating::{
+    AlternatingError, AlternatingEstimate, AlternatingSettings, estimate,
+};
+use calib_estimate::init::rig::{RigStart, start_rig};
+use calib_estimate::reprojection::residuals;
+use calib_rays::board::BoardShape;
+use calib_rays::field::{BaseLens, Rig};
+use calib_rays::progress::Progress;
 use nalgebra::Vector2;
 
 /// Screens, runs the published procedure, and checks it without the poses of each fold.

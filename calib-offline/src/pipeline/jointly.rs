@@ -2,15 +2,15 @@
 
 use super::Method;
 use super::solution::{FoldError, Solution, Solved, Task, folds_wanted};
-use crate::adjust::{Observations, StopReason};
 use crate::error::Error;
 use crate::evaluate::half_data::first_half;
 use crate::evaluate::held_out::Estimated;
 use crate::evaluate::{cross_check, estimate_folds};
-use crate::init::rig::start_rig;
-use crate::joint::{Estimate, EstimateError, estimate, estimate_screened};
-use crate::progress::Progress;
 use crate::report::record::ChoicesRecord;
+use calib_estimate::adjust::{Observations, StopReason};
+use calib_estimate::init::rig::start_rig;
+use calib_estimate::joint::{Estimate, EstimateError, estimate, estimate_screened};
+use calib_rays::progress::Progress;
 
 /// Screens, estimates, and checks: against itself, and without the poses of each fold.
 ///

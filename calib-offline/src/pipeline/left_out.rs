@@ -2,9 +2,9 @@
 
 use super::solution::{Unused, unused};
 use super::summary::Parts;
-use crate::detect::verdict::Outcome;
-use crate::init::screening::{Finding, FindingKind};
 use crate::report::record::{LeftOut, Renumbered};
+use calib_estimate::init::screening::{Finding, FindingKind};
+use calib_recording::detect::verdict::Outcome;
 
 /// Poses, views and corners that did not go in.
 pub fn left_out(parts: &Parts, names: &[String]) -> Vec<LeftOut> {

@@ -1,16 +1,16 @@
 //! What a method found, whichever it was: all that the record, the report and a comparison need.
 
 use super::Method;
-use crate::adjust::Observations;
-use crate::alternating::rays::RaySource;
-use crate::board::BoardShape;
 use crate::evaluate::{CrossChecks, Folds};
-use crate::field::Rig;
-use crate::geometry::RigidTransform;
-use crate::init::InitError;
-use crate::init::screening::Finding;
-use crate::observed::MIN_POSES;
 use crate::report::record::{AlternatingRecord, ChoicesRecord};
+use calib_estimate::adjust::Observations;
+use calib_estimate::alternating::rays::RaySource;
+use calib_estimate::init::InitError;
+use calib_estimate::init::screening::Finding;
+use calib_rays::board::BoardShape;
+use calib_rays::field::Rig;
+use calib_rays::geometry::RigidTransform;
+use calib_rays::observed::MIN_POSES;
 use nalgebra::Vector2;
 
 /// What a method is to do.

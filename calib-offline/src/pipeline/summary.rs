@@ -3,16 +3,16 @@
 use super::Corners;
 use super::left_out::{left_out, renumbered};
 use super::solution::Solution;
-use crate::adjust::Observations;
-use crate::dataset::identity::input_sha256;
-use crate::dataset::{Dataset, stage};
 use crate::evaluate::half_data::HalfDataCheck;
 use crate::evaluate::verdict::{Figures, Thresholds, judge};
 use crate::evaluate::{CrossChecks, HeldOut, fit_stage_axes};
-use crate::numerics::rms;
 use crate::report::record::{
     Calibration, CornerRecord, EstimateRecord, HeldOutRecord, PoseRecord, SCHEMA, StageAxis,
 };
+use calib_estimate::adjust::Observations;
+use calib_rays::numerics::rms;
+use calib_recording::dataset::identity::input_sha256;
+use calib_recording::dataset::{Dataset, stage};
 use nalgebra::Vector2;
 
 /// Results of all steps.
@@ -155,7 +155,7 @@ fn held_out_record(held_out: &HeldOut) -> Option<HeldOutRecord> {
 
 fn pose_records(parts: &Parts, camera_count: usize) -> Vec<PoseRecord> {
     let solution = parts.solution;
-    let all_poses = crate::dataset::corners::poses(&parts.corners.views);
+    let all_poses = calib_recording::dataset::corners::poses(&parts.corners.views);
     solution
         .rig_from_board
         .iter()
@@ -189,7 +189,7 @@ fn pose_records(parts: &Parts, camera_count: usize) -> Vec<PoseRecord> {
 }
 
 fn stage_axes(parts: &Parts, poses: &[PoseRecord]) -> Vec<StageAxis> {
-    let all_poses = crate::dataset::corners::poses(&parts.corners.views);
+    let all_poses = calib_recording::dataset::corners::poses(&parts.corners.views);
     fit_stage_axes(poses, |pose| {
         stage::entry(parts.dataset, &all_poses, pose).placement
     })

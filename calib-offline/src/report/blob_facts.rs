@@ -1,7 +1,7 @@
 //! What is said of the blob that was written beside a report.
 
 use super::text::short;
-use crate::pack::{CurvePoint, Packed};
+use calib_blob::pack::{CurvePoint, Packed};
 use serde::Serialize;
 
 /// What is known of the blob that was written beside the report.

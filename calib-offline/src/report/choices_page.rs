@@ -4,8 +4,8 @@ use super::record::{Calibration, ChoicesRecord};
 use super::text::short;
 use super::words;
 use crate::evaluate::CrossChecks;
-use crate::joint::Family;
-use crate::joint::choice::NEEDED_GAIN;
+use calib_estimate::joint::Family;
+use calib_estimate::joint::choice::NEEDED_GAIN;
 use maud::{Markup, html};
 
 /// The sections; nothing for a record of an earlier version.

@@ -4,18 +4,18 @@ use super::record::{
     BoardShape, Calibration, ChoicesRecord, CornerRecord, EstimateRecord, Grade, HeldOutRecord,
     LeftOut, PoseRecord, Renumbered, SCHEMA, Verdict,
 };
-use crate::board::BoardSpec;
 use crate::evaluate::CrossChecks;
 use crate::evaluate::central_model::CentralModel;
 use crate::evaluate::centrality::Centrality;
 use crate::evaluate::half_data::{HalfData, HalfDataCheck};
 use crate::evaluate::working_volume::PointDifference;
-use crate::field::uncertainty::packed;
-use crate::field::{
+use calib_estimate::joint::{Alternative, Choice, Family, SmoothnessFound};
+use calib_rays::board::BoardSpec;
+use calib_rays::field::uncertainty::packed;
+use calib_rays::field::{
     BaseLens, CalibratedCamera, CoverageMask, PairUncertainty, Projection, RayField, Rig,
 };
-use crate::geometry::{PixelPoint, RigidTransform, SensorSize, so3};
-use crate::joint::{Alternative, Choice, Family, SmoothnessFound};
+use calib_rays::geometry::{PixelPoint, RigidTransform, SensorSize, so3};
 use nalgebra::{Matrix4, Vector2, Vector3};
 
 const SENSOR: SensorSize = SensorSize::new(1280, 1024);

@@ -202,8 +202,8 @@ fn provenance(calibration: &Calibration) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pack::CurvePoint;
     use crate::report::example;
+    use calib_blob::pack::CurvePoint;
 
     fn blob() -> BlobFacts {
         let point = |bytes, error_px| CurvePoint {

@@ -2,7 +2,7 @@
 
 use super::record::{AlternatingRecord, Calibration};
 use super::text::short;
-use crate::alternating::start::StartKind;
+use calib_estimate::alternating::start::StartKind;
 use maud::{Markup, html};
 
 /// Facts about the procedure, each with its name; nothing for another method.
@@ -119,9 +119,9 @@ pub fn draw(calibration: &Calibration) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::alternating::estimate::StartCost;
-    use crate::alternating::spread::{SpreadChoice, SpreadError};
     use crate::report::example;
+    use calib_estimate::alternating::estimate::StartCost;
+    use calib_estimate::alternating::spread::{SpreadChoice, SpreadError};
 
     #[test]
     fn what_was_chosen_and_what_was_not_is_told() {

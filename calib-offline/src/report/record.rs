@@ -1,15 +1,15 @@
 //! `calibration.json`: everything a calibration found, versioned, enough to draw every figure again.
 
-use crate::alternating::estimate::{PlacementCircles, StartCost};
-use crate::alternating::spread::SpreadChoice;
-pub use crate::board::BoardShape;
-use crate::board::BoardSpec;
 pub use crate::evaluate::CrossChecks;
 pub use crate::evaluate::held_out::FailedFold;
 pub use crate::evaluate::verdict::{Grade, Verdict};
-use crate::field::Rig;
-use crate::geometry::{PixelPoint, RigidTransform};
-use crate::joint::{Choice, SmoothnessFound};
+use calib_estimate::alternating::estimate::{PlacementCircles, StartCost};
+use calib_estimate::alternating::spread::SpreadChoice;
+use calib_estimate::joint::{Choice, SmoothnessFound};
+pub use calib_rays::board::BoardShape;
+use calib_rays::board::BoardSpec;
+use calib_rays::field::Rig;
+use calib_rays::geometry::{PixelPoint, RigidTransform};
 use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 

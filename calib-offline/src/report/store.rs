@@ -3,8 +3,8 @@
 
 use super::Calibration;
 use super::record::SCHEMA;
-use crate::field::polynomial::{MAX_DEGREE, term_count};
-use crate::field::{CalibratedCamera, PairUncertainty, SmoothMap};
+use calib_rays::field::polynomial::{MAX_DEGREE, term_count};
+use calib_rays::field::{CalibratedCamera, PairUncertainty, SmoothMap};
 use ray_runtime::format::IDENTITY_LEN;
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};

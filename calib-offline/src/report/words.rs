@@ -5,8 +5,8 @@ use super::text::short;
 use crate::evaluate::central_model::CentralModel;
 use crate::evaluate::centrality::Centrality;
 use crate::evaluate::half_data::{HalfData, HalfDataCheck, Skipped};
-use crate::field::structured::OFFSET_CORE_DEGREE;
-use crate::joint::{Alternative, Choice, Family};
+use calib_estimate::joint::{Alternative, Choice, Family};
+use calib_rays::field::structured::OFFSET_CORE_DEGREE;
 
 /// How many numbers of a kind there are, and how many of them the data determine.
 #[derive(Debug, Clone, Copy, PartialEq)]

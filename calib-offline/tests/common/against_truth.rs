@@ -1,17 +1,15 @@
 //! Estimates of simulated scenes judged against their truth.
 
-use calib_offline::adjust::Observations;
-use calib_offline::board::BoardSpec;
+use calib_estimate::adjust::Observations;
+use calib_estimate::init::rig::start_rig;
+use calib_estimate::init::screening::{Finding, FindingKind};
+use calib_estimate::joint::{Estimate, estimate_screened};
 use calib_offline::evaluate::truth::{PointWithTruth, TruthErrors, compare_with_truth};
 use calib_offline::experiments::methods::Measurer;
-use calib_offline::geometry::{PixelPoint, RigidTransform, best_placement, so3};
-use calib_offline::init::rig::start_rig;
-use calib_offline::init::screening::{Finding, FindingKind};
-use calib_offline::joint::{Estimate, estimate_screened};
-use calib_offline::observed::View;
-use calib_offline::simulate::{
-    CameraOptics, MatchSet, OpticsKind, Scene, SceneSettings, TrueMatch,
-};
+use calib_rays::board::BoardSpec;
+use calib_rays::geometry::{PixelPoint, RigidTransform, best_placement, so3};
+use calib_rays::observed::View;
+use calib_simulate::{CameraOptics, MatchSet, OpticsKind, Scene, SceneSettings, TrueMatch};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,11 +1,11 @@
 //! The check of two halves of a scene's poses.
 
 use super::against_truth::run_views;
+use calib_estimate::joint::Estimate;
 use calib_offline::evaluate::half_data::{HalfData, HalfDataCheck, first_half};
 use calib_offline::evaluate::{CrossChecks, cross_check};
-use calib_offline::joint::Estimate;
-use calib_offline::observed::View;
-use calib_offline::simulate::{OpticsKind, Scene, SceneSettings};
+use calib_rays::observed::View;
+use calib_simulate::{OpticsKind, Scene, SceneSettings};
 
 pub fn names() -> [String; 2] {
     ["left".to_owned(), "right".to_owned()]

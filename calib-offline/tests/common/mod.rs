@@ -3,11 +3,11 @@
 #![allow(clippy::format_push_string, reason = "shorter than write! in a test")]
 #![allow(dead_code, reason = "each test file uses its part")]
 
-use calib_offline::board::BoardSpec;
-use calib_offline::field::{BaseLens, CalibratedCamera, CoverageMask, Projection, RayField, Rig};
-use calib_offline::geometry::{PixelPoint, RigidTransform, SensorSize, so3};
 use calib_offline::report::Calibration;
 use calib_offline::report::record::{BoardShape, EstimateRecord, Grade, SCHEMA, Verdict};
+use calib_rays::board::BoardSpec;
+use calib_rays::field::{BaseLens, CalibratedCamera, CoverageMask, Projection, RayField, Rig};
+use calib_rays::geometry::{PixelPoint, RigidTransform, SensorSize, so3};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::path::Path;

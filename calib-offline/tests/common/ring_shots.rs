@@ -1,14 +1,14 @@
 //! Rendered images of the ring target, and how far what is found in them lies from the truth.
 
-use calib_offline::dataset::TargetSpec;
-use calib_offline::dataset::image::GrayImage;
-use calib_offline::detect::ring_target::{Located, TargetRefusal, TargetSettings, locate};
-use calib_offline::geometry::{PixelPoint, RigidTransform, so3};
-use calib_offline::simulate::pattern::{
+use calib_rays::geometry::{PixelPoint, RigidTransform, so3};
+use calib_recording::dataset::TargetSpec;
+use calib_recording::dataset::image::GrayImage;
+use calib_recording::detect::ring_target::{Located, TargetRefusal, TargetSettings, locate};
+use calib_simulate::pattern::{
     DIRECTION_MARKERS, DIRECTION_RADII_MM, RING_COLS, RING_PITCH_MM, RING_RADII_MM, RING_ROWS,
 };
-use calib_offline::simulate::target::{seen_markers, target_poses};
-use calib_offline::simulate::{OpticsKind, RenderSettings, Scene, SceneSettings};
+use calib_simulate::target::{seen_markers, target_poses};
+use calib_simulate::{OpticsKind, RenderSettings, Scene, SceneSettings};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 

@@ -1,8 +1,8 @@
 use super::*;
 use crate::cli::settings::{Narration, Settings};
-use crate::dataset::{CornersError, SufficiencyError};
 use crate::error::UsageError;
 use crate::report::example;
+use calib_recording::dataset::{CornersError, SufficiencyError};
 use std::fs;
 
 fn console() -> Console {
@@ -61,7 +61,7 @@ fn all_three_files_are_written_and_belong_together() {
 
     let calibration = Calibration::load(&args.output.join("calibration.json")).unwrap();
     assert_eq!(calibration, example::calibration());
-    let bytes = crate::pack::read_aligned(&args.output.join("rig.rays")).unwrap();
+    let bytes = calib_blob::pack::read_aligned(&args.output.join("rig.rays")).unwrap();
     let blob = ray_runtime::RayBlob::open(&bytes).unwrap();
     assert_eq!(blob.identity(), &calibration.identity());
     let page = fs::read_to_string(args.output.join("report.html")).unwrap();
@@ -135,7 +135,7 @@ fn an_output_that_is_a_file_is_refused_before_any_work() {
 
 #[test]
 fn the_method_and_the_ray_tables_asked_for_are_made_and_written() {
-    use crate::field::RayTable;
+    use calib_rays::field::RayTable;
     let folder = tempfile::tempdir().unwrap();
     dataset(folder.path());
     let args = CalibrateArgs {

@@ -39,7 +39,7 @@ pub fn draw(blob: &BlobFacts) -> Option<Figure> {
         svg.circle("bar c0", *point, 2.5);
     }
     axes.draw_x_at(&mut svg, "bytes of all tables", &byte_ticks(axes.x));
-    let in_words = |point: &crate::pack::CurvePoint| {
+    let in_words = |point: &calib_blob::pack::CurvePoint| {
         format!(
             "{} bytes: {} px, {} mm at the working distance",
             point.bytes,

@@ -2,9 +2,9 @@
 
 use super::svg::{Svg, point};
 use super::{Figure, WIDTH};
-use crate::field::CalibratedCamera;
-use crate::geometry::{PixelPoint, SensorSize};
 use crate::report::Calibration;
+use calib_rays::field::CalibratedCamera;
+use calib_rays::geometry::{PixelPoint, SensorSize};
 use std::fmt::Write as _;
 
 /// From sensor to drawing: the whole sensor, outer edge to outer edge.

@@ -4,9 +4,9 @@
 use super::coverage::SensorView;
 use super::svg::{Anchor, Svg, point};
 use super::{Figure, WIDTH};
-use crate::field::CalibratedCamera;
 use crate::report::Calibration;
 use crate::report::record::CornerRecord;
+use calib_rays::field::CalibratedCamera;
 
 /// Length of the reference arrow, units.
 const ARROW: f64 = 10.0;

@@ -2,9 +2,9 @@
 
 use super::svg::{Anchor, Svg};
 use super::{Figure, WIDTH};
-use crate::geometry::{PixelPoint, RigidTransform};
 use crate::report::Calibration;
 use crate::report::text::short;
+use calib_rays::geometry::{PixelPoint, RigidTransform};
 use nalgebra::{Matrix2x3, Vector2, Vector3};
 
 /// Room around the drawing, units.

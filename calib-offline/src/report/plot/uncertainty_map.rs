@@ -4,11 +4,11 @@
 use super::coverage::SensorView;
 use super::svg::{Anchor, Svg, point};
 use super::{Figure, WIDTH};
-use crate::field::{CalibratedCamera, PairUncertainty, PointCovariance};
-use crate::geometry::PixelPoint;
 use crate::report::Calibration;
 use crate::report::facts::Facts;
 use crate::report::text::short;
+use calib_rays::field::{CalibratedCamera, PairUncertainty, PointCovariance};
+use calib_rays::geometry::PixelPoint;
 use nalgebra::Matrix3;
 use std::fmt::Write as _;
 

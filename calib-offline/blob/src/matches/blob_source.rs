@@ -1,0 +1,91 @@
+//! Points from a blob, with the device's own f32 code.
+
+use calib_rays::measure::{Point, PointSource, Sighting, Status};
+use nalgebra::{Matrix3, Vector3};
+use ray_runtime::{Measurement, RayBlob};
+
+/// A blob, evaluated by the device's own library.
+#[derive(Debug)]
+pub struct BlobSource<'a> {
+    blob: &'a RayBlob<'a>,
+    /// Turned about the origin after subtracting the camera's place.
+    rig_from_frame: Option<ray_runtime::RigFromCamera>,
+}
+
+impl<'a> BlobSource<'a> {
+    /// Points in the blob's frame, or in the frame of one camera; `None` if there is no such
+    /// camera.
+    pub fn new(blob: &'a RayBlob<'a>, camera_frame: Option<&str>) -> Option<Self> {
+        let rig_from_frame = match camera_frame {
+            None => None,
+            Some(name) => Some(blob.camera(blob.camera_index(name)?)?.rig_from_camera),
+        };
+        Some(Self {
+            blob,
+            rig_from_frame,
+        })
+    }
+}
+
+impl PointSource for BlobSource<'_> {
+    type Number = f32;
+
+    fn cameras(&self) -> Vec<String> {
+        (0..self.blob.camera_count())
+            .filter_map(|k| self.blob.camera(k))
+            .map(|camera| camera.name.to_owned())
+            .collect()
+    }
+
+    fn point(&self, sightings: &[Sighting<f32>]) -> Result<Point<f32>, Status> {
+        let pixel =
+            |(camera_idx, [u, v]): Sighting<f32>| (camera_idx, ray_runtime::PixelPoint::new(u, v));
+        // A blob knows pairs.
+        let result = if let [a, b] = *sightings {
+            self.blob.triangulate_with_covariance(pixel(a), pixel(b))
+        } else {
+            let sightings: Vec<_> = sightings.iter().copied().map(pixel).collect();
+            let found = self.blob.triangulate_many(&sightings);
+            found.map(|found| Measurement {
+                found,
+                // Of more than two rays none is above another.
+                is_second_above: false,
+                covariance: None,
+            })
+        };
+        let Measurement {
+            found, covariance, ..
+        } = result.map_err(|error| match error {
+            ray_runtime::MeasureError::Behind => Status::Behind,
+            ray_runtime::MeasureError::Parallel => Status::Parallel,
+            _ => Status::Outside,
+        })?;
+        let point_mm = match &self.rig_from_frame {
+            None => found.point_mm,
+            Some(rig_from_frame) => in_frame(rig_from_frame, &found.point_mm),
+        };
+        Ok(Point {
+            point_mm: point_mm.into(),
+            gap_mm: found.gap_mm(),
+            sigma_mm: covariance.map(|covariance| match &self.rig_from_frame {
+                // In the blob's own frame these are the device's bits.
+                None => covariance.sigma_mm(),
+                Some(rig_from_frame) => sigma_in_frame(rig_from_frame, &covariance.total_mm2()),
+            }),
+        })
+    }
+}
+
+fn sigma_in_frame(
+    rig_from_frame: &ray_runtime::RigFromCamera,
+    covariance_mm2: &Matrix3<f32>,
+) -> [f32; 3] {
+    let rotation = &rig_from_frame.rotation;
+    let in_frame = rotation.transpose() * covariance_mm2 * rotation;
+    // Round-off may leave less than nothing of a variance near zero.
+    [0, 1, 2].map(|k| in_frame[(k, k)].max(0.0).sqrt())
+}
+
+fn in_frame(rig_from_frame: &ray_runtime::RigFromCamera, point_mm: &Vector3<f32>) -> Vector3<f32> {
+    rig_from_frame.rotation.transpose() * (point_mm - rig_from_frame.translation_mm)
+}

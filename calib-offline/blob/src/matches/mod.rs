@@ -1,0 +1,23 @@
+//! Matches in, points out: `MATCHES.csv` and `POINTS.csv`.
+//!
+//! A match is one point as pixels of two or more cameras. Every row of the input has exactly one
+//! row in the output, in the input's order. Files of any length go through in blocks, so that
+//! memory does not grow with them.
+
+pub mod blob_source;
+mod error;
+mod header;
+pub mod known;
+mod list;
+mod row;
+mod stream;
+
+pub use blob_source::BlobSource;
+pub use error::MatchesError;
+pub use header::Columns;
+pub use known::{KnownMatches, TruePoint, read_known};
+pub use list::read_matches;
+pub use stream::{MeasureSummary, StreamError, measure_batches, measure_stream};
+
+/// The header of `POINTS.csv`.
+pub const POINTS_HEADER: &str = "id,x,y,z,gap,sigma_x,sigma_y,sigma_z,status";

@@ -1,0 +1,356 @@
+//! What was seen, arranged for adjustment: one block per view, with everything that does not
+//! change while parameters move computed once.
+
+use calib_rays::board::BoardSpec;
+use calib_rays::field::polynomial::{self, AxisValues, Polynomial};
+use calib_rays::field::spline::AxisWeights;
+use calib_rays::field::{BaseLens, CoverageMask, FieldSample, RayField};
+use calib_rays::geometry::{PixelPoint, SensorSize};
+use calib_rays::observed::{Corner, View};
+use nalgebra::{DMatrix, Matrix2, Vector2, Vector3};
+use std::sync::Arc;
+
+/// All views offered to an adjustment.
+#[derive(Debug, Clone)]
+pub struct Observations {
+    /// The board.
+    pub board: BoardSpec,
+    /// Sensor per camera.
+    pub sensors: Vec<SensorSize>,
+    /// Numbers of the poses, rising; a pose's index here is its index everywhere in `adjust`.
+    /// A number stands here once per instant: twice if the cameras' views of it do not belong
+    /// together.
+    pub poses: Vec<usize>,
+    /// One block per view, in (camera, pose) order.
+    pub views: Vec<ViewBlock>,
+}
+
+/// The corners that one camera saw of one pose.
+#[derive(Debug, Clone)]
+pub struct ViewBlock {
+    /// Index of the camera.
+    pub camera_idx: usize,
+    /// Index into [`Observations::poses`].
+    pub pose_idx: usize,
+    /// The corners.
+    pub corners: Vec<ObservedCorner>,
+}
+
+/// One corner of one view.
+#[derive(Debug, Clone, Copy)]
+pub struct ObservedCorner {
+    /// Row on the board.
+    pub row: usize,
+    /// Column on the board.
+    pub col: usize,
+    /// Nominal position, board frame, mm.
+    pub point_in_board: Vector3<f64>,
+    /// Where it was seen.
+    pub pixel: PixelPoint,
+    /// Inverse variance relative to the typical corner of the dataset.
+    pub relative_weight: f64,
+}
+
+impl ObservedCorner {
+    /// As a dataset has it.
+    pub fn labelled(&self) -> Corner {
+        Corner {
+            row: self.row,
+            col: self.col,
+            pixel: self.pixel,
+            sigma_px: None,
+        }
+    }
+}
+
+impl Observations {
+    /// Arranges views. `sensors` are those of all cameras, whether they have views or not.
+    pub fn new(board: BoardSpec, sensors: Vec<SensorSize>, views: &[View]) -> Self {
+        let mut poses: Vec<usize> = views.iter().map(|view| view.pose).collect();
+        poses.sort_unstable();
+        poses.dedup();
+        let typical_sigma_px = median_sigma_px(views);
+        let mut blocks: Vec<ViewBlock> = views
+            .iter()
+            .filter_map(|view| {
+                let pose_idx = poses.binary_search(&view.pose).ok()?;
+                let corners = view
+                    .corners
+                    .iter()
+                    .map(|corner| ObservedCorner {
+                        row: corner.row,
+                        col: corner.col,
+                        point_in_board: board.corner_in_board(corner.row, corner.col),
+                        pixel: corner.pixel,
+                        relative_weight: corner
+                            .sigma_px
+                            .map_or(1.0, |sigma_px| (typical_sigma_px / sigma_px).powi(2)),
+                    })
+                    .collect();
+                Some(ViewBlock {
+                    camera_idx: view.camera_idx,
+                    pose_idx,
+                    corners,
+                })
+            })
+            .collect();
+        blocks.sort_by_key(|block| (block.camera_idx, block.pose_idx));
+        Self {
+            board,
+            sensors,
+            poses,
+            views: blocks,
+        }
+    }
+
+    /// Number of different poses; one that was split counts once.
+    pub fn different_pose_count(&self) -> usize {
+        let repeated = self.poses.windows(2).filter(|w| w[0] == w[1]).count();
+        self.poses.len() - repeated
+    }
+
+    /// Names for cameras that need none: their numbers.
+    pub fn numbered_cameras(&self) -> Vec<String> {
+        (0..self.sensors.len()).map(|k| k.to_string()).collect()
+    }
+
+    /// Number of corners in all views.
+    pub fn corner_count(&self) -> usize {
+        self.views.iter().map(|view| view.corners.len()).sum()
+    }
+
+    /// The calibrated area of a camera: that of its corners that count, which `counts` is asked of
+    /// by index of the view and of the corner in it.
+    pub fn coverage(
+        &self,
+        camera_idx: usize,
+        counts: impl Fn(usize, usize) -> bool,
+    ) -> CoverageMask {
+        let views = self.views.iter().enumerate();
+        let corners = views
+            .filter(|(_, view)| view.camera_idx == camera_idx)
+            .flat_map(|(view_idx, view)| {
+                let corners = view.corners.iter().enumerate();
+                corners.map(move |(corner_idx, corner)| (view_idx, corner_idx, corner.pixel))
+            })
+            .filter(|(view_idx, corner_idx, _)| counts(*view_idx, *corner_idx))
+            .map(|(_, _, pixel)| pixel);
+        CoverageMask::from_corners(self.sensors[camera_idx], corners)
+    }
+
+    /// The views of some poses only, with poses renumbered.
+    pub fn with_poses(&self, keep: impl Fn(usize) -> bool) -> Self {
+        self.with_pose_indices(|pose_idx| keep(self.poses[pose_idx]))
+    }
+
+    /// The views of the poses with some indices only, with poses renumbered.
+    pub fn with_pose_indices(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let kept: Vec<usize> = (0..self.poses.len()).filter(|idx| keep(*idx)).collect();
+        let views = self
+            .views
+            .iter()
+            .filter_map(|view| {
+                let pose_idx = kept.binary_search(&view.pose_idx).ok()?;
+                Some(ViewBlock {
+                    pose_idx,
+                    ..view.clone()
+                })
+            })
+            .collect();
+        Self {
+            board: self.board,
+            sensors: self.sensors.clone(),
+            poses: kept.iter().map(|idx| self.poses[*idx]).collect(),
+            views,
+        }
+    }
+
+    /// The views of one camera only, as camera 0; poses it did not see are dropped.
+    pub fn of_camera(&self, camera_idx: usize) -> Self {
+        let mut seen = vec![false; self.poses.len()];
+        for view in self.views.iter().filter(|v| v.camera_idx == camera_idx) {
+            seen[view.pose_idx] = true;
+        }
+        let mut selected = self.with_pose_indices(|pose_idx| seen[pose_idx]);
+        selected.views.retain(|view| view.camera_idx == camera_idx);
+        for view in &mut selected.views {
+            view.camera_idx = 0;
+        }
+        selected.sensors = vec![self.sensors[camera_idx]];
+        selected
+    }
+}
+
+/// Median of the corners' own standard deviations, px; 1 if none has one.
+fn median_sigma_px(views: &[View]) -> f64 {
+    let mut sigmas: Vec<f64> = views
+        .iter()
+        .flat_map(|view| view.corners.iter().filter_map(|corner| corner.sigma_px))
+        .collect();
+    sigmas.sort_by(f64::total_cmp);
+    sigmas.get(sigmas.len() / 2).copied().unwrap_or(1.0)
+}
+
+/// The values of the fixed functions at the corners of one view: base lens, Legendre products and
+/// the weights of the spline's knots.
+#[derive(Debug, Clone)]
+pub struct ViewBasis {
+    /// Base lens and products; shared by all models that differ in knots only.
+    polynomial: Arc<PolynomialBasis>,
+    /// Weights along u and v at each corner; empty without a spline.
+    pub knots: Vec<(AxisWeights, AxisWeights)>,
+}
+
+#[derive(Debug)]
+struct PolynomialBasis {
+    lens: BaseLens,
+    degree: usize,
+    /// Base lens at each corner: half-angle vector and derivative per px.
+    base: Vec<(Vector2<f64>, Matrix2<f64>)>,
+    /// Products of the highest degree in use, one column per corner; those of lower degree come
+    /// first.
+    products: DMatrix<f64>,
+    /// Their derivatives by u, 1/px.
+    products_du: DMatrix<f64>,
+    /// Their derivatives by v, 1/px.
+    products_dv: DMatrix<f64>,
+    /// The single polynomials up to twice the degree, for products of products.
+    axes: Vec<AxisValues>,
+}
+
+impl ViewBasis {
+    /// Evaluates the fixed functions of a field at the corners of a view.
+    pub fn new(view: &ViewBlock, field: &RayField) -> Self {
+        Self {
+            polynomial: Arc::new(PolynomialBasis::new(view, field)),
+            knots: knots(view, field),
+        }
+    }
+
+    /// The same for a changed field; what did not change is taken over.
+    pub fn of_changed(&self, view: &ViewBlock, field: &RayField) -> Self {
+        let known = &self.polynomial;
+        if known.lens == field.base && known.degree == highest_degree(field) {
+            Self {
+                polynomial: Arc::clone(known),
+                knots: knots(view, field),
+            }
+        } else {
+            Self::new(view, field)
+        }
+    }
+
+    /// Legendre products, one column per corner; those of lower degree come first.
+    pub fn products(&self) -> &DMatrix<f64> {
+        &self.polynomial.products
+    }
+
+    /// Highest degree of the products.
+    pub fn degree(&self) -> usize {
+        self.polynomial.degree
+    }
+
+    /// The single polynomials at a corner, up to twice [`Self::degree`].
+    pub fn axes(&self, corner_idx: usize) -> &AxisValues {
+        &self.polynomial.axes[corner_idx]
+    }
+
+    /// The field's numbers at a corner. An adjustment has no spline in its offsets, and none is
+    /// looked at.
+    pub fn sample(&self, field: &RayField, corner_idx: usize) -> FieldSample {
+        let fixed = &*self.polynomial;
+        let (mut s, mut ds) = fixed.base[corner_idx];
+        let (value, derivative) = fixed.sum(&field.direction.polynomial, corner_idx);
+        s += value;
+        ds += derivative;
+        if let (Some(spline), Some((u, v))) = (&field.direction.spline, self.knots.get(corner_idx))
+        {
+            let (value, derivative) = spline.weighted(u, v);
+            s += value;
+            ds += derivative;
+        }
+        let (m_mm, dm) = field
+            .offset
+            .as_ref()
+            .map_or((Vector2::zeros(), Matrix2::zeros()), |offset| {
+                fixed.sum(&offset.polynomial, corner_idx)
+            });
+        FieldSample { s, ds, m_mm, dm }
+    }
+}
+
+/// Weights of the spline's knots along u and v at each corner of a view.
+fn knots(view: &ViewBlock, field: &RayField) -> Vec<(AxisWeights, AxisWeights)> {
+    field
+        .direction
+        .spline
+        .as_ref()
+        .map_or_else(Vec::new, |spline| {
+            view.corners
+                .iter()
+                .map(|corner| {
+                    (
+                        spline.grid.weights_u(corner.pixel.u),
+                        spline.grid.weights_v(corner.pixel.v),
+                    )
+                })
+                .collect()
+        })
+}
+
+fn highest_degree(field: &RayField) -> usize {
+    field
+        .offset
+        .as_ref()
+        .map_or(0, |offset| offset.polynomial.degree)
+        .max(field.direction.polynomial.degree)
+}
+
+impl PolynomialBasis {
+    fn new(view: &ViewBlock, field: &RayField) -> Self {
+        let degree = highest_degree(field);
+        let (n, k) = (view.corners.len(), polynomial::term_count(degree));
+        let mut basis = Self {
+            lens: field.base,
+            degree,
+            base: Vec::with_capacity(n),
+            products: DMatrix::zeros(k, n),
+            products_du: DMatrix::zeros(k, n),
+            products_dv: DMatrix::zeros(k, n),
+            axes: Vec::with_capacity(n),
+        };
+        let center = field.sensor.center();
+        let mut values = Vec::with_capacity(k);
+        for (c, corner) in view.corners.iter().enumerate() {
+            let offset = Vector2::new(corner.pixel.u - center.u, corner.pixel.v - center.v);
+            basis.base.push(field.base.evaluate(&offset));
+            basis.axes.push(polynomial::axis_values(
+                field.sensor,
+                2 * degree,
+                corner.pixel,
+            ));
+            polynomial::basis(field.sensor, degree, corner.pixel, &mut values);
+            for (r, [value, du, dv]) in values.iter().enumerate() {
+                basis.products[(r, c)] = *value;
+                basis.products_du[(r, c)] = *du;
+                basis.products_dv[(r, c)] = *dv;
+            }
+        }
+        basis
+    }
+
+    /// A polynomial and its derivative by (u, v) at a corner.
+    fn sum(&self, polynomial: &Polynomial, corner_idx: usize) -> (Vector2<f64>, Matrix2<f64>) {
+        let columns = [&self.products, &self.products_du, &self.products_dv];
+        let [p, du, dv] = columns.map(|m| &m.as_slice()[corner_idx * m.nrows()..][..m.nrows()]);
+        let mut sums = [[0.0; 2]; 3];
+        for (((c, p), du), dv) in polynomial.coefficients.iter().zip(p).zip(du).zip(dv) {
+            for (sum, factor) in sums.iter_mut().zip([p, du, dv]) {
+                sum[0] += c.x * factor;
+                sum[1] += c.y * factor;
+            }
+        }
+        let [value, du, dv] = sums.map(Vector2::from);
+        (value, Matrix2::from_columns(&[du, dv]))
+    }
+}

@@ -1,0 +1,33 @@
+//! Initialization: from labelled corners to fields, poses and extrinsics good enough to adjust.
+//!
+//! Zhang's closed form is no starting point for all lenses: it knows no distortion. (That a rotation
+//! about one axis would be near-critical for it was not found: `pinhole::zhang` has the figures.)
+//! Instead ([`focal_scan`]) each
+//! camera tries ideal lenses of many focal lengths and two kinds, places every board by its
+//! bearings ([`bearing_pose`]), and refines the best few with a cubic field; the cameras are then
+//! joined over their common poses ([`rig`]). METHOD section 3. On the way views and pairs of views
+//! that cannot be what they claim are found ([`screening`]).
+
+pub mod bearing_pose;
+mod error;
+pub mod focal_scan;
+pub mod pair_consensus;
+mod parallel_rays;
+pub mod rig;
+pub mod screening;
+pub mod view_fit;
+
+pub use calib_rays::observed::MIN_POSES;
+pub use error::InitError;
+
+use crate::adjust::observations::ViewBlock;
+use bearing_pose::is_collinear;
+
+/// Fewest corners that place a board.
+pub const MIN_CORNERS: usize = 6;
+
+/// Whether the view alone can place its board.
+pub fn is_usable(view: &ViewBlock) -> bool {
+    let points: Vec<_> = view.corners.iter().map(|c| c.point_in_board).collect();
+    points.len() >= MIN_CORNERS && !is_collinear(&points)
+}

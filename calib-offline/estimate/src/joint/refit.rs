@@ -1,0 +1,111 @@
+//! The estimate made again from where it ended, with something changed: cheaper than a new one, as
+//! the start is good and the choice of the model is kept.
+
+use super::choice::Candidate;
+use super::error::EstimateError;
+use super::estimate::{Estimate, LAST, finish};
+use super::fit::Fit;
+use crate::adjust::{Model, Observations};
+use calib_rays::board::BoardShape;
+
+/// An estimate whose cameras are all central, and what that costs.
+#[derive(Debug, Clone)]
+pub struct CentralEstimate {
+    /// The estimate.
+    pub estimate: Estimate,
+    /// Twice the log evidence that the model with offsets is ahead of it.
+    pub evidence_loss: f64,
+}
+
+impl Estimate {
+    /// The same model from some of the poses only (by their number in the dataset): fields, poses,
+    /// extrinsics, board shape, smoothness weights and noise are found again; spline spacing,
+    /// which camera is central, and the share of independent corners are kept.
+    ///
+    /// It starts where this estimate ended, and ends where those poses lead.
+    ///
+    /// # Errors
+    /// [`EstimateError::Singular`] if those poses leave a parameter open.
+    pub fn of_poses(&self, keep: impl Fn(usize) -> bool) -> Result<Self, EstimateError> {
+        let observations = self.observations.with_poses(&keep);
+        let poses = self.observations.poses.iter();
+        let model = Model {
+            rig_from_board: poses
+                .zip(&self.model.rig_from_board)
+                .filter(|(pose, _)| keep(**pose))
+                .map(|(_, rig_from_board)| *rig_from_board)
+                .collect(),
+            ..self.model.clone()
+        };
+        let mut fit = Fit::new(model, self.fit.smoothness.clone(), &observations);
+        fit.share = self.fit.share;
+        let settled = settled(fit, &observations)?;
+        Ok(self.remade(settled.fit, observations))
+    }
+
+    /// The same without the offsets of all cameras.
+    ///
+    /// # Errors
+    /// [`EstimateError::Singular`] if the data leave a parameter open.
+    pub fn made_central(&self) -> Result<CentralEstimate, EstimateError> {
+        let observations = self.observations.clone();
+        let with_offsets = self.fit.clone().round(&observations)?;
+        let fit = self.fit.changed(&observations, |model| {
+            for camera in &mut model.cameras {
+                camera.drop_offset();
+            }
+        });
+        let central = settled(fit, &observations)?;
+        Ok(CentralEstimate {
+            evidence_loss: with_offsets - central.evidence,
+            estimate: self.remade(central.fit, observations),
+        })
+    }
+
+    fn remade(&self, fit: Fit, observations: Observations) -> Self {
+        let choices = self.choices.clone();
+        finish(fit, observations, self.neighbor_correlation, choices)
+    }
+
+    /// Distance from the board's highest to its lowest corner, mm, and its standard deviation as
+    /// far as the terms of the shape are independent.
+    ///
+    /// Cost: one assembly of the equations.
+    ///
+    /// # Errors
+    /// [`EstimateError::Singular`] if the data leave a parameter open.
+    pub fn board_peak_to_valley_mm(&mut self) -> Result<(f64, f64), EstimateError> {
+        let (layout, _, reduced) = self.fit.equations(&self.observations)?;
+        let variances = reduced.global_variances();
+        let board = self.observations.board;
+        let shape: &BoardShape = &self.model.board_shape;
+        let heights = (0..board.corner_count()).map(|k| {
+            let corner = board.corner_in_board(k / board.cols, k % board.cols);
+            (shape.height_mm(&board, &corner), corner)
+        });
+        let heights: Vec<_> = heights.collect();
+        let by_height = |a: &&(f64, _), b: &&(f64, _)| a.0.total_cmp(&b.0);
+        let (Some((high, peak)), Some((low, valley))) = (
+            heights.iter().max_by(by_height),
+            heights.iter().min_by(by_height),
+        ) else {
+            return Ok((0.0, 0.0));
+        };
+        let differences = shape
+            .products(&board, peak)
+            .zip(shape.products(&board, valley))
+            .map(|(a, b)| a - b);
+        let variance: f64 = differences
+            .zip(layout.board)
+            .map(|(by_term, k)| by_term * by_term * variances[k])
+            .sum();
+        Ok((high - low, variance.sqrt()))
+    }
+}
+
+/// Rounds until the evidence settles, then steps until the fit does.
+fn settled(fit: Fit, observations: &Observations) -> Result<Candidate, EstimateError> {
+    let mut candidate = Candidate::settle(fit, f64::NEG_INFINITY, observations)?;
+    candidate.fit.adjust(observations, LAST);
+    Ok(candidate)
+}

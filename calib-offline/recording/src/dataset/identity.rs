@@ -1,0 +1,113 @@
+//! A name for what went into a calibration: equal exactly when the facts are equal.
+
+use super::Dataset;
+use calib_rays::observed::View;
+use sha2::{Digest, Sha256};
+use std::fmt::Write as _;
+
+/// SHA-256, hex, over the manifest's facts and the corners.
+///
+/// The facts, not the files: comments, the order of keys, the folder's place and how a number was
+/// written do not matter; every value that an estimate could depend on does, bit for bit. Image
+/// files count only through the corners found in them.
+pub fn input_sha256(dataset: &Dataset, views: &[View]) -> String {
+    let mut facts = String::from("calib-offline/input/1\n");
+    let board = &dataset.board;
+    // Writing to a String cannot fail.
+    let _ = writeln!(
+        facts,
+        "board {} {} {}",
+        board.rows, board.cols, board.square_mm
+    );
+    for camera in &dataset.cameras {
+        let _ = writeln!(facts, "camera {} {}", camera.name, camera.sensor);
+    }
+    if let Some(stage) = &dataset.stage {
+        let _ = writeln!(facts, "stage {:?} {:?}", stage.angles_deg, stage.placement);
+    }
+    let _ = writeln!(facts, "exclude {:?}", dataset.excluded_poses);
+    let mut hash = Sha256::new();
+    hash.update(&facts);
+    for view in views {
+        facts.clear();
+        let _ = writeln!(facts, "view {} {}", view.camera_idx, view.pose);
+        for corner in &view.corners {
+            let _ = writeln!(
+                facts,
+                "{} {} {:016x} {:016x} {:016x}",
+                corner.row,
+                corner.col,
+                corner.pixel.u.to_bits(),
+                corner.pixel.v.to_bits(),
+                corner.sigma_px.map_or(0, f64::to_bits),
+            );
+        }
+        hash.update(&facts);
+    }
+    hex(&hash.finalize())
+}
+
+/// Bytes as hexadecimal digits: how identities are shown.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes
+        .iter()
+        .fold(String::with_capacity(2 * bytes.len()), |mut hex, byte| {
+            let _ = write!(hex, "{byte:02x}");
+            hex
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::CameraSpec;
+    use calib_rays::board::BoardSpec;
+    use calib_rays::geometry::{PixelPoint, SensorSize};
+    use calib_rays::observed::Corner;
+
+    #[test]
+    fn every_fact_changes_it_and_the_folder_does_not() {
+        let dataset = Dataset {
+            folder: "a".into(),
+            board: BoardSpec {
+                rows: 5,
+                cols: 4,
+                square_mm: 10.0,
+            },
+            cameras: vec![CameraSpec {
+                name: "left".to_owned(),
+                sensor: SensorSize::new(640, 480),
+                images: Vec::new(),
+            }],
+            stage: None,
+            excluded_poses: [3].into(),
+            target: None,
+        };
+        let views = vec![View {
+            camera_idx: 0,
+            pose: 0,
+            corners: vec![Corner {
+                row: 1,
+                col: 2,
+                pixel: PixelPoint::new(1.5, 2.5),
+                sigma_px: None,
+            }],
+        }];
+        let hash = input_sha256(&dataset, &views);
+        assert_eq!(hash.len(), 64);
+        let mut moved = dataset.clone();
+        moved.folder = "b".into();
+        assert_eq!(input_sha256(&moved, &views), hash);
+
+        let mut changed = vec![dataset.clone(), dataset.clone(), dataset.clone()];
+        changed[0].board.square_mm = 10.000000000000002;
+        changed[1].excluded_poses.clear();
+        changed[2].cameras[0].sensor.width = 641;
+        for other in changed {
+            assert_ne!(input_sha256(&other, &views), hash);
+        }
+        let mut other = views.clone();
+        other[0].corners[0].pixel.v = 2.5000000000000004;
+        assert_ne!(input_sha256(&dataset, &other), hash);
+    }
+}

@@ -1,0 +1,310 @@
+//! Gray images: PNG, JPEG, TIFF, BMP, PGM of 8 or 16 bits, as numbers to measure in.
+
+use calib_rays::geometry::SensorSize;
+use image::{DynamicImage, ImageReader};
+use std::path::{Path, PathBuf};
+
+/// A gray image; values are the file's own code values (0 to [`GrayImage::white_level`]).
+#[derive(Debug, Clone, PartialEq)]
+pub struct GrayImage {
+    /// Width and height.
+    pub sensor: SensorSize,
+    /// Row-major, `width * height` values.
+    pub values: Vec<f32>,
+    /// The largest value that the file format can hold: 255 or 65535.
+    pub white_level: f32,
+}
+
+/// Why an image could not be used. Each names the file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImageError {
+    /// The file could not be opened or read.
+    #[error("{}: cannot be read", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file is no image of a known format, or a damaged one.
+    #[error("{}: is not a PNG, JPEG, TIFF, BMP or PGM image that can be decoded", path.display())]
+    Undecodable {
+        /// The file.
+        path: PathBuf,
+        /// What the decoder said.
+        source: image::ImageError,
+    },
+    /// The image is not as large as the manifest says.
+    #[error(
+        "{}: is {found} pixels, but the manifest says {expected} for this camera", path.display()
+    )]
+    WrongSize {
+        /// The file.
+        path: PathBuf,
+        /// Size of the image.
+        found: SensorSize,
+        /// Size in the manifest.
+        expected: SensorSize,
+    },
+}
+
+impl ImageError {
+    /// What to do about it.
+    pub fn remedy(&self) -> String {
+        match self {
+            Self::Unreadable { .. } | Self::Undecodable { .. } => {
+                "copy the image again; or leave the pose out with exclude under [dataset], or take \
+                 the image out of the camera's list (image_list, with \"\" in its place)"
+            }
+            Self::WrongSize { found, expected, .. }
+                if (found.width, found.height) == (expected.height, expected.width) =>
+            {
+                "width and height swapped? Correct them in dataset.toml"
+            }
+            Self::WrongSize { .. } => {
+                "correct width and height of this camera in dataset.toml, or use the images as they \
+                 came from the sensor (not scaled, not cropped)"
+            }
+        }
+        .to_owned()
+    }
+}
+
+impl GrayImage {
+    /// An image from its values, row-major; `None` if their number is not `width * height` or no
+    /// pixel is left.
+    pub fn from_values(sensor: SensorSize, values: Vec<f32>, white_level: f32) -> Option<Self> {
+        let pixel_count = sensor.width as usize * sensor.height as usize;
+        (pixel_count > 0 && values.len() == pixel_count).then_some(Self {
+            sensor,
+            values,
+            white_level,
+        })
+    }
+
+    /// Reads a file and makes it gray (colors by their luminance; transparency is ignored).
+    ///
+    /// # Errors
+    /// [`ImageError`], naming the file, if it cannot be read or decoded.
+    pub fn load(path: &Path) -> Result<Self, ImageError> {
+        let unreadable = |source| ImageError::Unreadable {
+            path: path.to_path_buf(),
+            source,
+        };
+        let reader = ImageReader::open(path)
+            .map_err(unreadable)?
+            .with_guessed_format()
+            .map_err(unreadable)?;
+        let decoded = reader.decode().map_err(|source| match source {
+            image::ImageError::IoError(source) => ImageError::Unreadable {
+                path: path.to_path_buf(),
+                source,
+            },
+            source => ImageError::Undecodable {
+                path: path.to_path_buf(),
+                source,
+            },
+        })?;
+        Ok(Self::from_decoded(&decoded))
+    }
+
+    /// Like [`GrayImage::load`], and refuses an image of another size than the manifest's.
+    ///
+    /// # Errors
+    /// As [`GrayImage::load`]; [`ImageError::WrongSize`].
+    pub fn load_sized(path: &Path, expected: SensorSize) -> Result<Self, ImageError> {
+        let image = Self::load(path)?;
+        if image.sensor == expected {
+            Ok(image)
+        } else {
+            Err(ImageError::WrongSize {
+                path: path.to_path_buf(),
+                found: image.sensor,
+                expected,
+            })
+        }
+    }
+
+    fn from_decoded(decoded: &DynamicImage) -> Self {
+        let sensor = SensorSize::new(decoded.width(), decoded.height());
+        let deep = matches!(
+            decoded,
+            DynamicImage::ImageLuma16(_)
+                | DynamicImage::ImageLumaA16(_)
+                | DynamicImage::ImageRgb16(_)
+                | DynamicImage::ImageRgba16(_)
+                | DynamicImage::ImageRgb32F(_)
+                | DynamicImage::ImageRgba32F(_)
+        );
+        let (values, white_level) = if deep {
+            let gray = decoded.to_luma16();
+            let values = gray.as_raw().iter().map(|&v| f32::from(v)).collect();
+            (values, f32::from(u16::MAX))
+        } else {
+            let gray = decoded.to_luma8();
+            let values = gray.as_raw().iter().map(|&v| f32::from(v)).collect();
+            (values, f32::from(u8::MAX))
+        };
+        Self {
+            sensor,
+            values,
+            white_level,
+        }
+    }
+
+    /// The value of a pixel, or `None` outside the image.
+    pub fn at(&self, u: i64, v: i64) -> Option<f32> {
+        let inside = (0..i64::from(self.sensor.width)).contains(&u)
+            && (0..i64::from(self.sensor.height)).contains(&v);
+        inside.then(|| self.values[v as usize * self.sensor.width as usize + u as usize])
+    }
+
+    /// The value between pixels, bilinear; `None` outside the outermost pixel centers.
+    pub fn between(&self, u: f64, v: f64) -> Option<f64> {
+        if !(u.is_finite() && v.is_finite()) {
+            return None;
+        }
+        let (u0, v0) = (u.floor(), v.floor());
+        let (fu, fv) = (u - u0, v - v0);
+        let value = |du: i64, dv: i64| self.at(u0 as i64 + du, v0 as i64 + dv).map(f64::from);
+        let top = lerp(value(0, 0)?, if fu > 0.0 { value(1, 0)? } else { 0.0 }, fu);
+        if fv == 0.0 {
+            return Some(top);
+        }
+        let bottom = lerp(value(0, 1)?, if fu > 0.0 { value(1, 1)? } else { 0.0 }, fu);
+        Some(lerp(top, bottom, fv))
+    }
+
+    /// The values below which the given fractions of the pixels lie.
+    pub fn quantiles<const N: usize>(&self, fractions: [f64; N]) -> [f32; N] {
+        let mut sorted = self.values.clone();
+        sorted.sort_unstable_by(f32::total_cmp);
+        fractions.map(|f| sorted[((sorted.len() - 1) as f64 * f.clamp(0.0, 1.0)).round() as usize])
+    }
+
+    /// The image in 8 bits, `black` and below to 0, `white` and above to 255.
+    pub fn stretched(&self, black: f32, white: f32) -> Vec<u8> {
+        let scale = 255.0 / (white - black).max(f32::MIN_POSITIVE);
+        let stretch = |v: &f32| ((v - black) * scale).round().clamp(0.0, 255.0) as u8;
+        self.values.iter().map(stretch).collect()
+    }
+
+    /// Twice the size, bilinear between the pixels and constant beyond the outermost.
+    ///
+    /// Pixel (u, v) of the result is centered on (u / 2 - 0.25, v / 2 - 0.25) of this image. `None`
+    /// if that is more pixels than can be counted.
+    pub fn doubled(&self) -> Option<Self> {
+        let (width, height) = (self.sensor.width, self.sensor.height);
+        let double = SensorSize::new(width.checked_mul(2)?, height.checked_mul(2)?);
+        let place =
+            |k: u32, count: u32| (f64::from(k) / 2.0 - 0.25).clamp(0.0, f64::from(count) - 1.0);
+        let mut values = Vec::with_capacity(4 * self.values.len());
+        for v in 0..double.height {
+            for u in 0..double.width {
+                let value = self.between(place(u, width), place(v, height))?;
+                values.push(value as f32);
+            }
+        }
+        Self::from_values(double, values, self.white_level)
+    }
+
+    /// Half the size, each pixel the mean of four; `None` below 2 x 2 pixels.
+    ///
+    /// Pixel (u, v) of the result is centered on (2u + 0.5, 2v + 0.5) of this image. An odd last
+    /// row or column is left out.
+    pub fn halved(&self) -> Option<Self> {
+        let half = SensorSize::new(self.sensor.width / 2, self.sensor.height / 2);
+        let width = self.sensor.width as usize;
+        let mut values = Vec::with_capacity(half.width as usize * half.height as usize);
+        for v in 0..half.height as usize {
+            for u in 0..half.width as usize {
+                let i = 2 * v * width + 2 * u;
+                let of = &self.values;
+                values.push((of[i] + of[i + 1] + of[i + width] + of[i + width + 1]) / 4.0);
+            }
+        }
+        Self::from_values(half, values, self.white_level)
+    }
+}
+
+fn lerp(a: f64, b: f64, t: f64) -> f64 {
+    if t == 0.0 { a } else { a + (b - a) * t }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{ImageBuffer, Luma, Rgb};
+
+    fn ramp(scale: u16) -> ImageBuffer<Luma<u16>, Vec<u16>> {
+        ImageBuffer::from_fn(7, 5, |u, v| Luma([scale * (u as u16 + 7 * v as u16)]))
+    }
+
+    #[test]
+    fn every_format_and_depth_gives_the_values_written() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a.png", "a.tiff", "a.bmp", "a.pgm"] {
+            let path = folder.path().join(name);
+            let gray: image::GrayImage =
+                ImageBuffer::from_fn(7, 5, |u, v| Luma([3 * (u as u8 + 7 * v as u8)]));
+            gray.save(&path).unwrap();
+            let read = GrayImage::load_sized(&path, SensorSize::new(7, 5)).unwrap();
+            assert_eq!(read.white_level, 255.0, "{name}");
+            assert_eq!(read.at(6, 4), Some(3.0 * 34.0), "{name}");
+        }
+        for name in ["b.png", "b.tiff", "b.pgm"] {
+            let path = folder.path().join(name);
+            ramp(1000).save(&path).unwrap();
+            let read = GrayImage::load(&path).unwrap();
+            assert_eq!(read.white_level, 65535.0, "{name}");
+            assert_eq!(read.at(2, 1), Some(9000.0), "{name}");
+        }
+        // JPEG is lossy; a flat image comes back to within the quantization of its mean.
+        let path = folder.path().join("c.jpg");
+        ImageBuffer::from_pixel(16, 16, Rgb([90u8, 90, 90]))
+            .save(&path)
+            .unwrap();
+        let read = GrayImage::load(&path).unwrap();
+        assert!(read.values.iter().all(|v| (v - 90.0).abs() <= 1.0));
+    }
+
+    #[test]
+    fn errors_name_the_file_and_both_sizes() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("small.png");
+        ramp(1).save(&path).unwrap();
+        let wrong = GrayImage::load_sized(&path, SensorSize::new(640, 480)).unwrap_err();
+        let message = wrong.to_string();
+        for part in ["small.png", "7x5", "640x480"] {
+            assert!(message.contains(part), "{message}");
+        }
+        let missing = GrayImage::load(&folder.path().join("none.png")).unwrap_err();
+        assert!(matches!(missing, ImageError::Unreadable { .. }));
+        for (name, bytes) in [("empty.png", &b""[..]), ("binary.jpg", &[7u8; 300][..])] {
+            let path = folder.path().join(name);
+            std::fs::write(&path, bytes).unwrap();
+            let message = GrayImage::load(&path).unwrap_err().to_string();
+            assert!(message.contains(name), "{message}");
+        }
+    }
+
+    #[test]
+    fn values_between_pixels_are_bilinear_and_end_at_the_outer_centers() {
+        let image =
+            GrayImage::from_values(SensorSize::new(2, 2), vec![0.0, 10.0, 20.0, 30.0], 255.0)
+                .unwrap();
+        assert_eq!(image.between(0.25, 0.5), Some(12.5));
+        assert_eq!(image.between(1.0, 1.0), Some(30.0));
+        assert_eq!(image.between(1.01, 0.0), None);
+        assert_eq!(image.between(-0.01, 0.0), None);
+        assert_eq!(image.between(f64::NAN, 0.0), None);
+        assert_eq!(image.halved().unwrap().values, vec![15.0]);
+        let doubled = image.doubled().unwrap();
+        assert_eq!(&doubled.values[..4], &[0.0, 2.5, 7.5, 10.0]);
+        assert_eq!(
+            doubled.halved().unwrap().values,
+            [3.75, 11.25, 18.75, 26.25]
+        );
+    }
+}

@@ -1,0 +1,440 @@
+//! `dataset.toml`: reading it strictly. A key that means nothing is an error, and so is a value
+//! that cannot be meant; each names the line.
+
+mod error;
+mod images;
+mod target;
+
+pub use error::ManifestError;
+pub use target::TargetProblem;
+
+use super::{CameraSpec, Dataset, StageSpec};
+use calib_rays::board::BoardSpec;
+use calib_rays::geometry::SensorSize;
+use serde::Deserialize;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+
+/// Fewest inner corners along a side: fewer leave no distance to compare with its neighbor.
+pub const MIN_CORNERS_PER_SIDE: i64 = 3;
+
+/// Most inner corners along a side; more is a slip of the pen.
+pub const MAX_CORNERS_PER_SIDE: i64 = 1000;
+
+/// Longest side of a sensor, px: the longest that a blob can describe.
+pub const MAX_SENSOR_PX: i64 = ray_runtime::format::MAX_EXTENT_PX as i64;
+
+/// Most cameras: the most that a blob can hold.
+pub const MAX_CAMERAS: usize = ray_runtime::format::MAX_CAMERAS as usize;
+
+/// Longest name of a camera, characters; it stands in CSV headers and in the blob.
+pub const MAX_NAME_CHARS: usize = 64;
+
+/// Smallest square, mm: a micrometer. Less is a slip of the pen or of the unit.
+pub const MIN_SQUARE_MM: f64 = 1e-3;
+
+/// Largest square, mm: ten meters. More is a slip of the pen or of the unit.
+pub const MAX_SQUARE_MM: f64 = 1e4;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawManifest {
+    dataset: Option<RawDataset>,
+    board: Option<Spanned<RawBoard>>,
+    #[serde(default)]
+    camera: Vec<Spanned<RawCamera>>,
+    stage: Option<RawStage>,
+    target: Option<Spanned<target::RawTarget>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawDataset {
+    #[serde(default)]
+    exclude: Vec<Spanned<usize>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawBoard {
+    kind: Option<Spanned<String>>,
+    rows: Option<Spanned<i64>>,
+    cols: Option<Spanned<i64>>,
+    square_mm: Option<Spanned<f64>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawCamera {
+    name: Option<Spanned<String>>,
+    width: Option<Spanned<i64>>,
+    height: Option<Spanned<i64>>,
+    images: Option<Spanned<String>>,
+    image_list: Option<Spanned<Vec<String>>>,
+    target_images: Option<Spanned<String>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawStage {
+    angles_deg: Option<Spanned<Vec<f64>>>,
+    placement: Option<Spanned<Vec<usize>>>,
+}
+
+/// The manifest's text, to name lines of it.
+struct Source {
+    file: PathBuf,
+    text: String,
+}
+
+impl Source {
+    fn line(&self, byte: usize) -> usize {
+        self.text.as_bytes()[..byte.min(self.text.len())]
+            .split(|b| *b == b'\n')
+            .count()
+    }
+
+    fn line_of<T>(&self, value: &Spanned<T>) -> usize {
+        self.line(value.span().start)
+    }
+}
+
+impl Dataset {
+    /// Reads the manifest of a dataset: a folder with `dataset.toml`, or that file.
+    ///
+    /// Images are looked up but not opened. Where `corners.csv` stands beside the manifest it is
+    /// what counts, and images that a manifest names may be missing.
+    ///
+    /// # Errors
+    /// [`ManifestError`], with the line.
+    pub fn load(path: &Path) -> Result<Self, ManifestError> {
+        let source = read(path)?;
+        let raw: RawManifest =
+            toml::from_str(&source.text).map_err(|error| ManifestError::Syntax {
+                file: source.file.clone(),
+                line: source.line(error.span().map_or(0, |span| span.start)),
+                message: error.message().replace('\n', " "),
+            })?;
+        let folder = match source.file.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        let board = board(&source, raw.board)?;
+        let has_corners = folder.join(Self::CORNERS).exists();
+        let cameras = cameras(&source, &folder, &raw.camera, has_corners)?;
+        let mut dataset = Self {
+            folder,
+            board,
+            cameras,
+            stage: None,
+            excluded_poses: BTreeSet::new(),
+            target: None,
+        };
+        dataset.target = target::target(&source, &dataset, raw.target, &raw.camera)?;
+        let pose_count = (!has_corners).then(|| dataset.image_pose_count());
+        if let Some(raw) = raw.stage {
+            dataset.stage = Some(stage(&source, raw, pose_count)?);
+        }
+        for pose in raw.dataset.map(|d| d.exclude).unwrap_or_default() {
+            match pose_count {
+                Some(count) if *pose.get_ref() >= count => {
+                    return Err(ManifestError::ExcludedUnknown {
+                        line: source.line_of(&pose),
+                        pose: *pose.get_ref(),
+                        last: count.saturating_sub(1),
+                        file: source.file,
+                    });
+                }
+                _ => dataset.excluded_poses.insert(pose.into_inner()),
+            };
+        }
+        Ok(dataset)
+    }
+}
+
+fn read(path: &Path) -> Result<Source, ManifestError> {
+    let file = if path.is_dir() {
+        path.join(Dataset::MANIFEST)
+    } else {
+        path.to_owned()
+    };
+    let named_so = file.file_name().is_some_and(|n| n == Dataset::MANIFEST);
+    if !named_so || !file.is_file() {
+        return Err(ManifestError::NotFound {
+            path: path.to_owned(),
+        });
+    }
+    let bytes = std::fs::read(&file).map_err(|source| ManifestError::Read {
+        file: file.clone(),
+        source,
+    })?;
+    match String::from_utf8(bytes) {
+        // The mark that some editors put before UTF-8 is no part of the text.
+        Ok(text) => Ok(Source {
+            text: match text.strip_prefix('\u{feff}') {
+                Some(rest) => rest.to_owned(),
+                None => text,
+            },
+            file,
+        }),
+        Err(error) => Err(ManifestError::NotText {
+            file,
+            byte: error.utf8_error().valid_up_to(),
+        }),
+    }
+}
+
+fn board(source: &Source, raw: Option<Spanned<RawBoard>>) -> Result<BoardSpec, ManifestError> {
+    let file = source.file.clone();
+    let raw = raw.ok_or_else(|| ManifestError::Missing {
+        file: file.clone(),
+        line: 1,
+        key: "[board]",
+    })?;
+    let line = source.line_of(&raw);
+    let raw = raw.into_inner();
+    if let Some(kind) = raw.kind
+        && kind.get_ref() != "chessboard"
+    {
+        return Err(ManifestError::BoardKind {
+            file,
+            line: source.line_of(&kind),
+            kind: kind.into_inner(),
+        });
+    }
+    let count = |value: Option<Spanned<i64>>, key| {
+        ranged(
+            source,
+            line,
+            value,
+            key,
+            MIN_CORNERS_PER_SIDE,
+            MAX_CORNERS_PER_SIDE,
+        )
+    };
+    let rows = count(raw.rows, "[board] rows")?;
+    let cols = count(raw.cols, "[board] cols")?;
+    let Some(square_mm) = raw.square_mm else {
+        return Err(ManifestError::SquareSizeMissing { file, line });
+    };
+    let value = *square_mm.get_ref();
+    let problem = if value.is_nan() {
+        "not a number"
+    } else if value.is_infinite() {
+        "infinite"
+    } else if value == 0.0 {
+        "zero"
+    } else if value < 0.0 {
+        "negative"
+    } else if value < MIN_SQUARE_MM {
+        "less than a micrometer (the unit is mm)"
+    } else if value > MAX_SQUARE_MM {
+        "more than ten meters (the unit is mm)"
+    } else {
+        return Ok(BoardSpec {
+            rows: rows as usize,
+            cols: cols as usize,
+            square_mm: value,
+        });
+    };
+    Err(ManifestError::SquareSize {
+        file,
+        line: source.line_of(&square_mm),
+        value,
+        problem,
+    })
+}
+
+fn ranged(
+    source: &Source,
+    table_line: usize,
+    value: Option<Spanned<i64>>,
+    key: &'static str,
+    least: i64,
+    most: i64,
+) -> Result<i64, ManifestError> {
+    let value = value.ok_or_else(|| ManifestError::Missing {
+        file: source.file.clone(),
+        line: table_line,
+        key,
+    })?;
+    if (least..=most).contains(value.get_ref()) {
+        return Ok(value.into_inner());
+    }
+    Err(ManifestError::OutOfRange {
+        file: source.file.clone(),
+        line: source.line_of(&value),
+        key,
+        value: value.into_inner(),
+        least,
+        most,
+    })
+}
+
+fn cameras(
+    source: &Source,
+    folder: &Path,
+    raw: &[Spanned<RawCamera>],
+    has_corners: bool,
+) -> Result<Vec<CameraSpec>, ManifestError> {
+    let file = &source.file;
+    if raw.is_empty() {
+        return Err(ManifestError::Missing {
+            file: file.clone(),
+            line: 1,
+            key: "[[camera]]",
+        });
+    }
+    if let Some(table) = raw.get(MAX_CAMERAS) {
+        return Err(ManifestError::TooManyCameras {
+            file: file.clone(),
+            line: source.line_of(table),
+            have: raw.len(),
+        });
+    }
+    let mut cameras: Vec<(usize, CameraSpec)> = Vec::with_capacity(raw.len());
+    for table in raw {
+        let table_line = source.line_of(table);
+        let camera = table.get_ref();
+        let name = camera_name(source, table_line, camera)?;
+        let line = camera
+            .name
+            .as_ref()
+            .map_or(table_line, |n| source.line_of(n));
+        if let Some((first_line, _)) = cameras.iter().find(|(_, c)| c.name == name) {
+            return Err(ManifestError::DuplicateCamera {
+                file: file.clone(),
+                line,
+                name,
+                first_line: *first_line,
+            });
+        }
+        let side = |value: &Option<Spanned<i64>>, key| {
+            ranged(source, table_line, value.clone(), key, 1, MAX_SENSOR_PX)
+        };
+        let width = side(&camera.width, "[[camera]] width")?;
+        let height = side(&camera.height, "[[camera]] height")?;
+        let images = images::images(source, folder, camera, &name, has_corners)?;
+        if images.is_empty() && !has_corners {
+            return Err(ManifestError::NothingToRead {
+                file: file.clone(),
+                line,
+                camera: name,
+            });
+        }
+        cameras.push((
+            line,
+            CameraSpec {
+                name,
+                sensor: SensorSize::new(width as u32, height as u32),
+                images,
+            },
+        ));
+    }
+    check_images_fit_together(file, &cameras)?;
+    Ok(cameras.into_iter().map(|(_, camera)| camera).collect())
+}
+
+fn camera_name(
+    source: &Source,
+    table_line: usize,
+    camera: &RawCamera,
+) -> Result<String, ManifestError> {
+    let name = camera.name.as_ref().ok_or_else(|| ManifestError::Missing {
+        file: source.file.clone(),
+        line: table_line,
+        key: "[[camera]] name",
+    })?;
+    let usable = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.');
+    let text = name.get_ref();
+    let length = text.chars().count();
+    if length == 0 || length > MAX_NAME_CHARS || !text.chars().all(usable) {
+        return Err(ManifestError::CameraName {
+            file: source.file.clone(),
+            line: source.line_of(name),
+            name: text.chars().take(MAX_NAME_CHARS).collect(),
+        });
+    }
+    Ok(text.clone())
+}
+
+/// Same number of images for every camera that has any, and no image for two views.
+fn check_images_fit_together(
+    file: &Path,
+    cameras: &[(usize, CameraSpec)],
+) -> Result<(), ManifestError> {
+    let mut with_images = cameras.iter().filter(|(_, c)| !c.images.is_empty());
+    if let Some((_, first)) = with_images.next()
+        && let Some((line, other)) = with_images.find(|(_, c)| c.images.len() != first.images.len())
+    {
+        return Err(ManifestError::UnequalImages {
+            file: file.to_owned(),
+            line: *line,
+            first_camera: first.name.clone(),
+            first_count: first.images.len(),
+            camera: other.name.clone(),
+            count: other.images.len(),
+        });
+    }
+    let mut seen = std::collections::HashMap::new();
+    for (line, camera) in cameras {
+        for (pose, image) in camera.images.iter().enumerate() {
+            let Some(image) = image else { continue };
+            if let Some((first_camera, first_pose)) = seen.insert(image, (&camera.name, pose)) {
+                return Err(ManifestError::ImageUsedTwice {
+                    file: file.to_owned(),
+                    line: *line,
+                    image: image.clone(),
+                    first_camera: first_camera.clone(),
+                    first_pose,
+                    camera: camera.name.clone(),
+                    pose,
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// `pose_count` is known where the images are the poses.
+fn stage(
+    source: &Source,
+    raw: RawStage,
+    pose_count: Option<usize>,
+) -> Result<StageSpec, ManifestError> {
+    let check_length = |key, line, have| match pose_count {
+        Some(need) if need != have => Err(ManifestError::StageLength {
+            file: source.file.clone(),
+            line,
+            key,
+            have,
+            need,
+        }),
+        _ => Ok(()),
+    };
+    if let Some(angles) = &raw.angles_deg {
+        let line = source.line_of(angles);
+        check_length("angles_deg", line, angles.get_ref().len())?;
+        let broken = angles.get_ref().iter().position(|a| !a.is_finite());
+        if let Some(index) = broken {
+            return Err(ManifestError::StageAngle {
+                file: source.file.clone(),
+                line,
+                index,
+                value: angles.get_ref()[index],
+            });
+        }
+    }
+    if let Some(placement) = &raw.placement {
+        let line = source.line_of(placement);
+        check_length("placement", line, placement.get_ref().len())?;
+    }
+    Ok(StageSpec {
+        angles_deg: raw.angles_deg.map(Spanned::into_inner),
+        placement: raw.placement.map(Spanned::into_inner),
+    })
+}
+
+#[cfg(test)]
+mod tests;

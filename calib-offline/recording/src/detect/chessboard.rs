@@ -1,0 +1,118 @@
+//! The chessboard detector behind our own trait: an image in, a grid of rough corners out.
+//!
+//! The detector crate finds corners and numbers them as a grid, from an origin of its own. What
+//! the numbers mean on the board, and where exactly the corners are, is settled by us (see
+//! [`super::labelling`] and [`super::corner_fit`]).
+
+use crate::dataset::image::GrayImage;
+use calib_rays::board::BoardSpec;
+use calib_rays::geometry::PixelPoint;
+use calib_targets::chessboard::{
+    ChessboardDetector as TopologicalGrid, ChessboardParams, GrayImageView, default_chess_config,
+    detect_corners,
+};
+use chess_corners::ImageRefiner;
+
+/// A corner as the detector numbered it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RawCorner {
+    /// Number along one direction of the board.
+    pub i: i32,
+    /// Number along the other.
+    pub j: i32,
+    /// Roughly where it is.
+    pub pixel: PixelPoint,
+}
+
+/// Finds the corners of a chessboard in an image.
+pub trait ChessboardDetector: Sync {
+    /// The corners of the largest connected grid, numbered from any origin and in any
+    /// orientation, mirrored included; empty if there is none.
+    ///
+    /// The grid may be a part of the board, and may have stray corners beside it.
+    fn detect(&self, image: &GrayImage, board: &BoardSpec) -> Vec<RawCorner>;
+}
+
+/// `ChESS` corners with a saddle-point refinement, joined to a grid by their triangulation.
+///
+/// The image is stretched to full contrast first, so that exposure does not matter, and tried at
+/// full, half and quarter size until the whole board is found: large blurred squares show their
+/// corners only in the small image. If most of the board is still missing, double size is tried:
+/// the detector needs squares of about eight pixels.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ChessTopologicalDetector;
+
+/// Reduced sizes tried: half and quarter.
+const SMALLER: [Scale; 2] = [Scale(2.0), Scale(4.0)];
+/// Fractions of the pixels that are allowed to saturate when the image is stretched.
+const STRETCH_QUANTILES: [f64; 2] = [0.005, 0.995];
+
+impl ChessboardDetector for ChessTopologicalDetector {
+    fn detect(&self, image: &GrayImage, board: &BoardSpec) -> Vec<RawCorner> {
+        let mut best = detect_at(image, Scale::FULL);
+        let mut smaller = None;
+        for scale in SMALLER {
+            if best.len() >= board.corner_count() {
+                return best;
+            }
+            smaller = smaller.as_ref().unwrap_or(image).halved();
+            let Some(at_scale) = &smaller else { break };
+            take_larger(&mut best, detect_at(at_scale, scale));
+        }
+        if 2 * best.len() < board.corner_count()
+            && let Some(double) = image.doubled()
+        {
+            take_larger(&mut best, detect_at(&double, Scale::DOUBLE));
+        }
+        best
+    }
+}
+
+/// A corner more or less at another size is no reason to give up the sharper ones.
+fn take_larger(best: &mut Vec<RawCorner>, found: Vec<RawCorner>) {
+    if found.len() > best.len() + best.len() / 10 {
+        *best = found;
+    }
+}
+
+/// Pixels of the original per pixel of a resized image.
+#[derive(Debug, Clone, Copy)]
+struct Scale(f64);
+
+impl Scale {
+    const FULL: Self = Self(1.0);
+    const DOUBLE: Self = Self(0.5);
+
+    /// In the original; pixels are areas whose outer edges coincide.
+    fn original(self, x: f32) -> f64 {
+        (f64::from(x) + 0.5) * self.0 - 0.5
+    }
+}
+
+fn detect_at(image: &GrayImage, scale: Scale) -> Vec<RawCorner> {
+    let [black, white] = image.quantiles(STRETCH_QUANTILES);
+    let stretched = image.stretched(black, white);
+    let view = GrayImageView {
+        width: image.sensor.width as usize,
+        height: image.sensor.height as usize,
+        data: &stretched,
+    };
+    let config = default_chess_config().with_refiner(ImageRefiner::saddle_point());
+    let corners = detect_corners(&view, &config);
+    let Ok(grid) = TopologicalGrid::new(ChessboardParams::default()) else {
+        return Vec::new();
+    };
+    let largest = grid.detect(&corners);
+    let corners = largest.map(|found| found.corners).unwrap_or_default();
+    corners
+        .iter()
+        .map(|corner| RawCorner {
+            i: corner.grid.u,
+            j: corner.grid.v,
+            pixel: PixelPoint::new(
+                scale.original(corner.position.x),
+                scale.original(corner.position.y),
+            ),
+        })
+        .collect()
+}
