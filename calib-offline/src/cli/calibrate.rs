@@ -61,9 +61,6 @@ pub struct CalibrateArgs {
     /// Leave these poses out, besides those that the manifest leaves out
     #[arg(long, value_name = "POSE", value_delimiter = ',')]
     pub exclude: Vec<usize>,
-    /// Seed of everything drawn at random
-    #[arg(long, default_value_t = 1)]
-    pub seed: u64,
     /// Write one ray per pixel of each camera too: `rays_NAME.npy`
     #[arg(long)]
     pub ray_tables: bool,

@@ -1,9 +1,7 @@
 //! `flash`, `device` and `measure --device`, driven as a user drives them: the real binary against the
 //! simulated device.
 
-mod common;
-
-use common::{Run, contents, run};
+use crate::common::{Run, contents, run};
 use firmware_sim::flash_file;
 use firmware_sim::host::SimulatedDevice;
 use firmware_sim::storage::trust::{PublicKey, Trust};
@@ -15,8 +13,9 @@ use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 use std::path::Path;
 use std::thread;
 
-static SMALL: &Aligned<[u8]> = &Aligned(*include_bytes!("../../data/golden/stereo-v3-small.rays"));
-static FAST: &Aligned<[u8]> = &Aligned(*include_bytes!("../../data/golden/stereo-v3-fast.rays"));
+static SMALL: &Aligned<[u8]> =
+    &Aligned(*include_bytes!("../../../data/golden/stereo-v3-small.rays"));
+static FAST: &Aligned<[u8]> = &Aligned(*include_bytes!("../../../data/golden/stereo-v3-fast.rays"));
 
 /// A device with this in its flash, and its address as the command line takes it.
 fn device(blob: &[u8]) -> (SimulatedDevice, String) {

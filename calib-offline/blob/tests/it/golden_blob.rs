@@ -1,6 +1,6 @@
 //! The golden blobs of format version 3: the packer writes today what it wrote then.
 //!
-//! `UPDATE_GOLDEN=1 cargo test --release -p calib-offline --test golden_blob` writes the files
+//! `UPDATE_GOLDEN=1 cargo test --release -p calib-blob --test it golden_blob` writes the files
 //! anew. That is right only if the packer was meant to change; a new format version gets a file
 //! of its own, and the old one stays.
 
@@ -16,7 +16,7 @@ use ray_runtime::RayBlob;
 use ray_runtime::format::{self, HEADER_LEN, Header, QuantizedHeader, RECORD_LEN};
 use std::path::Path;
 
-const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../data/golden");
+const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/golden");
 
 /// A rotation about y by an angle with this sine and cosine.
 fn yaw(sin: f64, cos: f64) -> Matrix3<f64> {

@@ -1,10 +1,6 @@
 //! The published procedure from corners to points, against the truth of simulated rigs.
 
-#[path = "common/against_truth.rs"]
-#[allow(dead_code, reason = "other tests use the rest")]
-mod against_truth;
-
-use against_truth::{errors_and_share, observations, scene};
+use crate::common::against_truth::{errors_and_share, observations, scene};
 use calib_estimate::alternating::alternation::AlternationStop;
 use calib_estimate::alternating::spread::SpreadError;
 use calib_estimate::alternating::stage_circle::project_onto_circles;

@@ -1,9 +1,7 @@
 //! Predicted uncertainty against the scatter over many noise draws.
 
-mod common;
-
+use crate::common::against_truth::{Coverage, coverage, run_scene, scene};
 use calib_simulate::{MatchSet, OpticsKind};
-use common::against_truth::{Coverage, coverage, run_scene, scene};
 
 #[test]
 fn ellipsoids_cover_as_often_as_they_say() {

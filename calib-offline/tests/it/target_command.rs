@@ -1,11 +1,9 @@
 //! `detect --target` through the real binary: what it writes, and what it refuses.
 
-mod common;
-
+use crate::common::{contents, run};
 use calib_rays::progress::Silent;
 use calib_recording::dataset::{Dataset, load_markers};
 use calib_recording::detect::ring_target::{TargetSettings, join_markers, target_views};
-use common::{contents, run};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;

@@ -1,14 +1,12 @@
 //! Views and pairs that are not what they claim: found, named, and harmless.
 
-mod common;
-
+use crate::common::against_truth::{
+    Named, hand_held, measure, named, observations, run_scene, run_views, scene,
+};
 use calib_estimate::init::InitError;
 use calib_estimate::init::rig::start_rig;
 use calib_rays::observed::View;
 use calib_simulate::OpticsKind;
-use common::against_truth::{
-    Named, hand_held, measure, named, observations, run_scene, run_views, scene,
-};
 
 #[test]
 fn views_numbered_from_the_other_end_are_renumbered() {

@@ -2,12 +2,10 @@
 
 #![allow(clippy::format_push_string, reason = "shorter than write! in a test")]
 
-mod common;
-
-use calib_offline::report::Calibration;
-use common::{
+use crate::common::{
     MANIFEST, Run, calibration, contents, corners_csv, dataset, project, rig, run, run_with_input,
 };
+use calib_offline::report::Calibration;
 use nalgebra::Vector3;
 use std::fs;
 use std::path::Path;

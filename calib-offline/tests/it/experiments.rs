@@ -1,7 +1,6 @@
 //! The publication's experiments on small simulated datasets.
 
-mod common;
-
+use crate::common::{MANIFEST, contents, corners_csv, dataset, run};
 use calib_offline::experiments::figures::figures;
 use calib_offline::experiments::methods::Method;
 use calib_offline::experiments::tables::tables;
@@ -11,7 +10,6 @@ use calib_rays::board::BoardSpec;
 use calib_rays::progress::Silent;
 use calib_recording::dataset::Dataset;
 use calib_simulate::{OpticsKind, OutputSettings, Scene, SceneSettings, write_dataset};
-use common::{MANIFEST, contents, corners_csv, dataset, run};
 use std::fs;
 use std::path::Path;
 

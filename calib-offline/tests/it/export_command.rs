@@ -1,8 +1,6 @@
 //! `export`, driven as a user drives it: the real binary on a golden blob.
 
-mod common;
-
-use common::{contents, run};
+use crate::common::{contents, run};
 use std::fs;
 use std::path::Path;
 use std::process::Command;

@@ -3,9 +3,7 @@
 
 #![allow(clippy::format_push_string, reason = "shorter than write! in a test")]
 
-mod common;
-
-use common::{MANIFEST, contents, corners_csv, dataset, run};
+use crate::common::{MANIFEST, contents, corners_csv, dataset, run};
 
 /// `calibrate` and `inspect` of a dataset. `inspect` must refuse what is broken (code 2) and
 /// describe what is merely not enough (code 3).

@@ -1,15 +1,12 @@
 //! The ring target in rendered images with known centers: how near, and whether every marker gets
 //! its own label or none.
 
-#[path = "common/ring_shots.rs"]
-mod ring_shots;
-
+use crate::ring_shots::{Errors, Shot, located, target};
 use calib_rays::geometry::{PixelPoint, SensorSize};
 use calib_recording::dataset::TargetSpec;
 use calib_recording::dataset::image::GrayImage;
 use calib_recording::detect::ring_target::{Located, TargetRefusal, TargetSettings, locate};
 use calib_simulate::{OpticsKind, RenderSettings, Scene, SceneSettings};
-use ring_shots::{Errors, Shot, located, target};
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
@@ -171,7 +168,7 @@ fn a_turned_image_has_the_same_labels_and_a_mirrored_one_is_refused() {
             .map(|i| image.values[i - i % width + width - 1 - i % width])
             .collect();
         let mirrored = GrayImage::from_values(image.sensor, values, 255.0).unwrap();
-        let refusal = ring_shots::located(&mirrored).unwrap_err();
+        let refusal = crate::ring_shots::located(&mirrored).unwrap_err();
         assert_eq!(refusal, TargetRefusal::Mirrored);
         assert!(refusal.to_string().contains("mirror"));
     }
@@ -261,7 +258,7 @@ fn a_cover_across_the_target_leaves_the_rest_or_a_refusal() {
         );
         assert_labels(&located, truth);
         // All of the large markers behind it: nothing tells where on the target the rest lies.
-        let refusal = ring_shots::located(&covered_to(truth[&(3, 6)], cover)).unwrap_err();
+        let refusal = crate::ring_shots::located(&covered_to(truth[&(3, 6)], cover)).unwrap_err();
         let ambiguous = matches!(refusal, TargetRefusal::AmbiguousDirection { placement_count, .. } if placement_count > 1);
         assert!(ambiguous, "{refusal}");
     }

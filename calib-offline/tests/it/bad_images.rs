@@ -1,8 +1,6 @@
 //! Files that should be images, given to the real binary.
 
-mod common;
-
-use common::{MANIFEST, contents, run};
+use crate::common::{MANIFEST, contents, run};
 use image::{ImageBuffer, Luma, Rgb};
 use std::fs;
 use std::path::Path;

@@ -1,11 +1,9 @@
 //! Initialization over all simulated optics; `examples/init_sweep.rs` goes over more rigs.
 
-mod common;
-
+use crate::common::against_truth::{observations, scene};
 use calib_estimate::init::InitError;
 use calib_estimate::init::rig::start_rig;
 use calib_simulate::OpticsKind;
-use common::against_truth::{observations, scene};
 
 #[test]
 fn every_kind_of_optics_starts_with_outliers_in_the_corners() {

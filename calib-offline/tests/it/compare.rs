@@ -1,14 +1,12 @@
 //! `compare`, driven as a user drives it, on simulated recordings.
 
-mod common;
-
+use crate::common::{MANIFEST, contents, corners_csv, dataset, run};
 use calib_offline::compare::contender::{CONTENDERS, Contender, Failure};
 use calib_offline::compare::{compare_methods, words};
 use calib_offline::pipeline;
 use calib_rays::progress::Silent;
 use calib_recording::dataset::Dataset;
 use calib_recording::detect::DetectSettings;
-use common::{MANIFEST, contents, corners_csv, dataset, run};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

@@ -1,8 +1,8 @@
 //! Predicted standard deviations of points: the blob against the calibration, and what `measure`
 //! writes with either.
 
-mod common;
-
+use crate::common::against_truth::{run_scene, scene};
+use crate::common::{SENSOR, calibration, project, run};
 use calib_blob::matches::BlobSource;
 use calib_blob::pack::{AlignedBytes, PackSettings, pack};
 use calib_offline::report::Calibration;
@@ -10,8 +10,6 @@ use calib_rays::field::PairUncertainty;
 use calib_rays::field::uncertainty::packed;
 use calib_rays::measure::{PointSource, RigSource};
 use calib_simulate::{MatchSet, OpticsKind};
-use common::against_truth::{run_scene, scene};
-use common::{SENSOR, calibration, project, run};
 use nalgebra::{Matrix4, Vector3};
 use ray_runtime::RayBlob;
 use std::fs;

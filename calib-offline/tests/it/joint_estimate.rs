@@ -1,11 +1,9 @@
 //! The joint estimate against simulated rigs whose true rays are known: how near it comes to the
 //! oracle, which triangulates the same noisy pixels with the true rays.
 
-mod common;
-
+use crate::common::against_truth::{measure, run_scene, scene};
 use calib_estimate::adjust::StopReason;
 use calib_simulate::OpticsKind;
-use common::against_truth::{measure, run_scene, scene};
 
 /// One draw of the noise moves the ratio by 0.005 (standard deviation, METHOD 9.3).
 const DRAW: f64 = 0.005;

@@ -1,8 +1,8 @@
 //! The checks of a calibration against itself: right where the simulation is what the model says,
 //! and telling where it is not.
 
-mod common;
-
+use crate::common::against_truth::{run_scene, run_views, scene};
+use crate::common::halves::{checked, halves_of, halves_of_one_camera, names};
 use calib_offline::evaluate::central_model::CentralModel;
 use calib_offline::evaluate::cross_check;
 use calib_offline::evaluate::half_data::{HalfDataCheck, Skipped};
@@ -11,8 +11,6 @@ use calib_rays::field::Rig;
 use calib_rays::geometry::best_placement;
 use calib_rays::geometry::{Ray, nearest_point, triangulate_pair};
 use calib_simulate::{OpticsKind, Scene};
-use common::against_truth::{run_scene, run_views, scene};
-use common::halves::{checked, halves_of, halves_of_one_camera, names};
 
 /// Noise draws per kind of optics.
 const SEEDS: u64 = 4;
