@@ -11,6 +11,7 @@ mod compare;
 mod cross_checks;
 mod data_files;
 mod device_commands;
+mod examples;
 mod experiments;
 mod export_command;
 mod joint_estimate;

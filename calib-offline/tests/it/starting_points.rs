@@ -1,4 +1,4 @@
-//! Initialization over all simulated optics; `examples/init_sweep.rs` goes over more rigs.
+//! Initialization over all simulated optics; `benches/init_sweep.rs` goes over more rigs.
 
 use crate::common::against_truth::{observations, scene};
 use calib_estimate::init::InitError;

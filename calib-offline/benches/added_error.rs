@@ -2,29 +2,36 @@
 //! made of it, the RMS of their difference over the RMS of the predicted standard deviation.
 //!
 //! ```sh
-//! cargo run --release -p calib-offline --example added_error -- out/calibration.json rig.rays set/holdout.csv
+//! cargo bench -p calib-offline --bench added_error -- out/calibration.json rig.rays set/holdout.csv
 //! ```
 
-use anyhow::{Context, bail};
 use calib_blob::matches::BlobSource;
 use calib_blob::matches::read_matches;
 use calib_blob::pack::AlignedBytes;
 use calib_offline::report::Calibration;
 use calib_rays::measure::{PointSource, RigSource};
 use ray_runtime::RayBlob;
+use std::error::Error;
 use std::path::PathBuf;
 
-fn main() -> anyhow::Result<()> {
-    let arguments: Vec<PathBuf> = std::env::args_os().skip(1).map(PathBuf::from).collect();
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments = std::env::args_os()
+        .skip(1)
+        .filter(|argument| argument != "--bench");
+    let arguments: Vec<PathBuf> = arguments.map(PathBuf::from).collect();
     let [calibration, blob, matches] = &arguments[..] else {
-        bail!("give calibration.json, a blob of it, and matches: see the head of this example");
+        return Err(
+            "give calibration.json, a blob of it, and matches: see the head of this file".into(),
+        );
     };
-    let read = |path: &PathBuf| std::fs::read(path).with_context(|| path.display().to_string());
+    let read = |path: &PathBuf| {
+        std::fs::read(path).map_err(|error| format!("{}: {error}", path.display()))
+    };
     let bytes = AlignedBytes::from(read(blob)?.as_slice());
-    let blob = RayBlob::open(&bytes).context("the blob")?;
-    let packed = BlobSource::new(&blob, None).context("the blob's own frame")?;
+    let blob = RayBlob::open(&bytes)?;
+    let packed = BlobSource::new(&blob, None).ok_or("the blob's own frame")?;
     let calibration = Calibration::load(calibration)?;
-    let exact = RigSource::new(&calibration.rig, None).context("the rig's own frame")?;
+    let exact = RigSource::new(&calibration.rig, None).ok_or("the rig's own frame")?;
 
     let (mut difference_squared, mut sigma_squared, mut count) = (0.0, 0.0, 0_usize);
     for sightings in read_matches::<f64>(matches, &exact.cameras())? {
@@ -46,7 +53,7 @@ fn main() -> anyhow::Result<()> {
         sigma_squared += sigma_mm.iter().map(|sigma| sigma.powi(2)).sum::<f64>();
     }
     if count == 0 {
-        bail!("no match has a point with a predicted standard deviation in both");
+        return Err("no match has a point with a predicted standard deviation in both".into());
     }
     let rms = |sum: f64| (sum / count as f64).sqrt();
     println!(

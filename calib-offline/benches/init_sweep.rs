@@ -1,7 +1,7 @@
 //! How often initialization finds its way, over many simulated rigs: one line per rig, then counts.
 //!
 //! ```text
-//! cargo run --release -p calib-offline --example init_sweep [-- ONLY]
+//! cargo bench -p calib-offline --bench init_sweep [-- ONLY]
 //! ```
 //!
 //! `ONLY` is part of a line's name ("fisheye", "640x480", "hand-held" ...).
@@ -24,7 +24,10 @@ enum Motion {
 }
 
 fn main() {
-    let only = std::env::args().nth(1).unwrap_or_default();
+    let mut arguments = std::env::args()
+        .skip(1)
+        .filter(|argument| argument != "--bench");
+    let only = arguments.next().unwrap_or_default();
     let sensors = [
         SensorSize::new(640, 480),
         SensorSize::new(1280, 1024),
