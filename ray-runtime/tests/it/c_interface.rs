@@ -12,23 +12,23 @@ use std::sync::{Mutex, PoisonError};
 static GOLDEN: [(&str, &Aligned<[u8]>); 4] = [
     (
         "stereo-v1.rays",
-        &Aligned(*include_bytes!("../../data/golden/stereo-v1.rays")),
+        &Aligned(*include_bytes!("../../../data/golden/stereo-v1.rays")),
     ),
     (
         "stereo-v2.rays",
-        &Aligned(*include_bytes!("../../data/golden/stereo-v2.rays")),
+        &Aligned(*include_bytes!("../../../data/golden/stereo-v2.rays")),
     ),
     (
         "stereo-v3-fast.rays",
-        &Aligned(*include_bytes!("../../data/golden/stereo-v3-fast.rays")),
+        &Aligned(*include_bytes!("../../../data/golden/stereo-v3-fast.rays")),
     ),
     (
         "stereo-v3-small.rays",
-        &Aligned(*include_bytes!("../../data/golden/stereo-v3-small.rays")),
+        &Aligned(*include_bytes!("../../../data/golden/stereo-v3-small.rays")),
     ),
 ];
 
-const HEADER: &str = include_str!("../c/rays.h");
+const HEADER: &str = include_str!("../../c/rays.h");
 /// As strict as a C compiler gets.
 const WARNINGS: [&str; 4] = ["-Wall", "-Wextra", "-Wpedantic", "-Werror"];
 
@@ -332,7 +332,7 @@ fn what_cannot_be_opened_or_asked_has_its_code() {
     let library = build_for_host("librays-misuse.a", &[]);
     let program = made("misuse");
     let mut command = Command::new("cc");
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/c_misuse.c");
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/c_misuse.c");
     command.args(["-std=c99", "-O2", "-I."]).args(WARNINGS);
     command.arg(source).arg(library).arg("-o").arg(&program);
     succeed(command.current_dir(c_folder()));

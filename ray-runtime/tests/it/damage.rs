@@ -1,15 +1,14 @@
 //! Bytes that are not quite a blob: each is refused, with the reason that fits, and none panics.
 
-mod common;
-
-use common::{
-    AlignedBytes, Random, TestBlob, TestCamera, TestPair, encoding, records_start, repair_checksum,
+use crate::test_blob::{
+    AlignedBytes, TestBlob, TestCamera, TestPair, encoding, records_start, repair_checksum,
 };
 use ray_runtime::format::{
     Form, HEADER_LEN, MAGIC, OLDEST_VERSION, PAIR_HEADER_LEN, PairHeader, RECORD_LEN, SelfTest,
     VERSION,
 };
 use ray_runtime::{OpenError, PixelPoint, RayBlob, Table};
+use split_mix::SplitMix;
 
 /// One central and one non-central camera, with a mask whose last byte is not full, and their
 /// uncertainty.
@@ -452,7 +451,7 @@ fn random_damage_with_a_right_checksum_never_panics() {
 
 fn random_damage_never_panics(form: Form) {
     let whole = sample_of(form).bytes();
-    let mut random = Random(2024);
+    let mut random = SplitMix(2024);
     let (mut opened, mut refused) = (0, 0);
     for round in 0..100_000 {
         let mut bytes = AlignedBytes::new(whole.bytes());

@@ -1,9 +1,7 @@
 //! `FORMAT.md` is enough to read a blob: a reader in Python that was written from it alone gives the bits
 //! that the golden blobs state, and refuses damage.
 
-mod common;
-
-use common::repair_checksum;
+use crate::test_blob::repair_checksum;
 use ray_runtime::format::Header;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -27,7 +25,7 @@ fn read(blob: &Path) -> Output {
 }
 
 fn read_with(reader: &str, blob: &Path) -> Output {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it");
     Command::new("python3")
         // Without the folder of compiled modules that Python would leave here.
         .arg("-B")

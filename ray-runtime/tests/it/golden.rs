@@ -3,7 +3,7 @@
 use ray_runtime::format::{self, Encoding, HEADER_LEN, Header, MAGIC, RECORD_LEN, Record};
 use ray_runtime::{Aligned, LookupError, MeasureError, PixelPoint, RayBlob, Region};
 
-static GOLDEN: &Aligned<[u8]> = &Aligned(*include_bytes!("../../data/golden/stereo-v1.rays"));
+static GOLDEN: &Aligned<[u8]> = &Aligned(*include_bytes!("../../../data/golden/stereo-v1.rays"));
 
 #[test]
 fn header_and_records_are_where_the_format_says() {
@@ -107,7 +107,7 @@ fn what_is_not_calibrated_has_no_answer() {
     );
 }
 
-static GOLDEN_2: &Aligned<[u8]> = &Aligned(*include_bytes!("../../data/golden/stereo-v2.rays"));
+static GOLDEN_2: &Aligned<[u8]> = &Aligned(*include_bytes!("../../../data/golden/stereo-v2.rays"));
 
 #[test]
 fn version_2_has_a_pair_behind_the_tables() {

@@ -1,13 +1,12 @@
 //! From points to pixels, and between images and sensors.
 
-mod common;
-
-use common::{Random, TestBlob, TestCamera, encoding};
+use crate::test_blob::{TestBlob, TestCamera, encoding};
 use nalgebra::Vector3;
 use ray_runtime::format::Form;
 use ray_runtime::{
     MeasureError, PixelPoint, ProjectError, RayBlob, Readout, ReadoutError, SensorWindow,
 };
+use split_mix::SplitMix;
 
 const FORMS: [Form; 3] = [Form::Spline, Form::Patches, Form::Quantized];
 
@@ -38,7 +37,7 @@ fn distance_px(a: PixelPoint, b: PixelPoint) -> f32 {
 #[test]
 fn a_point_on_a_pixels_ray_is_projected_to_that_pixel() {
     each_form(|blob| {
-        let mut random = Random(7);
+        let mut random = SplitMix(7);
         let mut found = 0;
         for _ in 0..2000 {
             let camera = random.below(2);

@@ -1,13 +1,12 @@
 //! Rays and points out of blobs whose answers can be computed by hand.
 
-mod common;
-
-use common::{Random, TestBlob, TestCamera, encoding};
+use crate::test_blob::{TestBlob, TestCamera, encoding};
 use nalgebra::Vector3;
 use ray_runtime::format::{Form, SelfTest};
 use ray_runtime::{
     LookupError, MeasureError, PixelPoint, RayBlob, SelfTestFailure, triangulate_pair,
 };
+use split_mix::SplitMix;
 
 const FORMS: [Form; 3] = [Form::Spline, Form::Patches, Form::Quantized];
 
@@ -210,7 +209,7 @@ fn four_cameras_around_a_point_find_it() {
     cameras[3].translation_mm = [0.0, 0.0, 600.0];
     let bytes = TestBlob::new(cameras.clone()).bytes();
     let blob = RayBlob::open(bytes.bytes()).unwrap();
-    let mut random = Random(7);
+    let mut random = SplitMix(7);
     for _ in 0..500 {
         let target = Vector3::new(
             random.between(-40.0, 40.0),

@@ -1,8 +1,5 @@
 //! Blobs made by hand from the schema, so that they can also be made wrong.
 
-// Each test program uses a part of this.
-#![allow(dead_code)]
-
 use ray_runtime::format::{
     self, Axis, CameraMeta, Encoding, Form, HEADER_LEN, Header, LengthUnit, Meta, PLACES_PER_CELL,
     PairHeader, PixelConvention, QuantizedHeader, QuantizedMap, RECORD_LEN, RecordFields, SelfTest,
@@ -380,28 +377,4 @@ pub fn repair_checksum(blob: &mut [u8]) {
 pub fn records_start(blob: &[u8]) -> usize {
     let (_, header) = Header::read(blob).unwrap();
     format::aligned(HEADER_LEN + header.meta_len as usize)
-}
-
-/// `SplitMix64`: a seeded sequence that is the same everywhere.
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// From 0 up to `end`, not included.
-    pub fn below(&mut self, end: usize) -> usize {
-        (self.next() % end as u64) as usize
-    }
-
-    /// Between `low` and `high`.
-    pub fn between(&mut self, low: f32, high: f32) -> f32 {
-        let unit = (self.next() >> 40) as f32 / (1u64 << 24) as f32;
-        low + (high - low) * unit
-    }
 }

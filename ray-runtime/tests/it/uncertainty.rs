@@ -1,8 +1,6 @@
 //! The covariance of a point against differences of the point itself, by pixels.
 
-mod common;
-
-use common::{TestBlob, TestCamera, TestPair, encoding};
+use crate::test_blob::{TestBlob, TestCamera, TestPair, encoding};
 use nalgebra::{Matrix3, Matrix4, Vector3};
 use ray_runtime::format::Form;
 use ray_runtime::{MeasureError, PixelPoint, RayBlob};
