@@ -4,12 +4,11 @@ use std::path::{Path, PathBuf};
 
 use ray_runtime::format::Form;
 use ray_runtime::{Camera, PixelPoint, Ray, RayBlob};
+use split_mix::SplitMix;
 
-use super::CostError;
-use super::report::CameraCost;
 use crate::counting::{Job, PixelPair, job_start};
-use crate::qemu;
-use crate::random::SplitMix;
+use crate::error::CostError;
+use crate::report::CameraCost;
 use crate::yardstick::{BilinearTable, Brown};
 
 /// The blobs that are counted if none are given, from the workspace's folder: one a line for every
@@ -34,10 +33,8 @@ const TABLE_NODES: [usize; 2] = [33, 25];
 
 /// The built-in list.
 pub fn built_in() -> Vec<PathBuf> {
-    BUILT_IN
-        .iter()
-        .map(|file| qemu::root().join(file))
-        .collect()
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
+    BUILT_IN.iter().map(|file| root.join(file)).collect()
 }
 
 /// A blob with the matches it is asked.

@@ -3,12 +3,12 @@
 use std::io::Write;
 use std::path::Path;
 
-use super::CostError;
-use super::blobs::{Asked, MATCH_COUNT};
-use super::image::Image;
-use super::report::{BlobCost, Conditions, Row, Spread};
+use crate::blobs::{Asked, MATCH_COUNT};
 use crate::counting::{KNOWN_INSTRUCTIONS, Probe, RECORD_LEN, Record};
-use crate::qemu;
+use crate::error::CostError;
+use crate::image::Image;
+use crate::images::Images;
+use crate::report::{BlobCost, Conditions, Row, Spread};
 
 /// Name of the image.
 pub const COUNTING: &str = "counting";
@@ -24,12 +24,13 @@ const TICK_NS: u64 = 40;
 /// # Errors
 /// [`CostError`].
 pub fn cost_of_blob(
+    images: &impl Images,
     image: &Image,
     path: &Path,
     asked: &Asked,
     conditions: &mut Conditions,
 ) -> Result<BlobCost, CostError> {
-    let records = run(path, asked)?;
+    let records = run(images, path, asked)?;
     let of = |probe: Probe| {
         records
             .iter()
@@ -95,14 +96,14 @@ pub fn cost_of_blob(
 }
 
 /// Runs the counting image on a blob.
-fn run(path: &Path, asked: &Asked) -> Result<Vec<Record>, CostError> {
+fn run(images: &impl Images, path: &Path, asked: &Asked) -> Result<Vec<Record>, CostError> {
     let io = |source| CostError::Io {
         what: "a temporary file for the flash".into(),
         source,
     };
     let mut flash = tempfile::NamedTempFile::new().map_err(io)?;
     flash.write_all(&asked.flash).map_err(io)?;
-    let output = qemu::run_counting(&qemu::image_path(COUNTING), flash.path(), TIME_SHIFT)?;
+    let output = images.run_counting(&images.path(COUNTING), flash.path(), TIME_SHIFT)?;
     if !output.status.success() {
         return Err(CostError::Failed {
             path: path.to_owned(),

@@ -5,7 +5,7 @@
 //! [`Probe`] on every match of the job and writes a [`Record`] for each run to its standard output.
 //!
 //! A new row of the table is a new [`Probe`] here, a function that does it in
-//! `cortex-m/src/bin/counting.rs`, and a line in `WORK` of `cost/count.rs`.
+//! `cortex-m/src/bin/counting.rs`, and a line in `WORK` of `count.rs`.
 
 use ray_runtime::PixelPoint;
 

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
-use serde::Serialize;
 
-use super::CostError;
-use super::stack::{self, StackBound};
+use crate::error::CostError;
+use crate::report::{Function, StackBound, Static};
+use crate::stack;
 
 /// Origin of what runs before and around everything.
 pub const STARTUP: &str = "startup";
@@ -46,30 +46,6 @@ pub struct Image {
     code: stack::Code,
 }
 
-/// A function of an image.
-#[derive(Debug, Clone, Serialize)]
-pub struct Function {
-    /// Its path, without a hash.
-    pub name: String,
-    /// Crate that it comes from; `startup` for what runs before and around everything, `callers` for
-    /// the image's own.
-    pub origin: String,
-    /// Bytes of code.
-    pub bytes: u64,
-    /// Where it starts.
-    #[serde(skip)]
-    pub address: u64,
-}
-
-/// A static of an image.
-#[derive(Debug, Clone, Serialize)]
-pub struct Static {
-    /// Its path, without a hash.
-    pub name: String,
-    /// Bytes.
-    pub bytes: u64,
-}
-
 impl Image {
     /// Reads an image.
     ///
@@ -102,7 +78,9 @@ impl Image {
         let mut statics = Vec::new();
         for symbol in file.symbols().filter(|symbol| symbol.size() > 0) {
             let mangled = symbol.name()?;
-            let name = format!("{:#}", rustc_demangle::demangle(mangled));
+            // What the footprint images share stands in a module of each.
+            let name = format!("{:#}", rustc_demangle::demangle(mangled))
+                .replace(&format!("{image}::footprint::"), &format!("{image}::"));
             match symbol.kind() {
                 SymbolKind::Text => {
                     // The lowest bit says Thumb. Functions may have several names: the first stays.

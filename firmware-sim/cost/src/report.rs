@@ -4,9 +4,6 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::image::{Function, Static};
-use super::stack::StackBound;
-
 /// Version of the layout of [`Cost`] as JSON.
 pub const SCHEMA: u32 = 1;
 
@@ -126,4 +123,38 @@ pub struct ImageCost {
     pub panics: Vec<String>,
     /// Bound of the stack by function, and of all that runs from reset on.
     pub stack_bounds: BTreeMap<&'static str, StackBound>,
+}
+
+/// A function of an image.
+#[derive(Debug, Clone, Serialize)]
+pub struct Function {
+    /// Its path, without a hash.
+    pub name: String,
+    /// Crate that it comes from; `startup` for what runs before and around everything, `callers` for
+    /// the image's own.
+    pub origin: String,
+    /// Bytes of code.
+    pub bytes: u64,
+    /// Where it starts.
+    #[serde(skip)]
+    pub address: u64,
+}
+
+/// A static of an image.
+#[derive(Debug, Clone, Serialize)]
+pub struct Static {
+    /// Its path, without a hash.
+    pub name: String,
+    /// Bytes.
+    pub bytes: u64,
+}
+
+/// Bound of the stack of a function with all that it calls.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StackBound {
+    /// Bytes below the caller's frame.
+    Bytes(u32),
+    /// None could be found; why.
+    Unknown(String),
 }

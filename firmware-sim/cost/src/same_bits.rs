@@ -1,8 +1,8 @@
 //! One number for the bits of many answers, so that machines can be compared: the host, a Cortex-M4F,
 //! and a processor without a floating-point unit.
 
-use crate::random::SplitMix;
 use ray_runtime::{Camera, Measurement, PixelPoint, RayBlob};
+use split_mix::SplitMix;
 
 /// A checksum of the answers to `count` matches of the first two cameras of a blob: point, gap and
 /// standard deviations, or the code of why there is no point; and of the pixels that some points are

@@ -11,19 +11,8 @@
 use std::collections::BTreeMap;
 
 use object::{Object, ObjectSection, ObjectSymbol};
-use serde::Serialize;
 
-use super::image::Function;
-
-/// Bound of the stack of a function with all that it calls.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum StackBound {
-    /// Bytes below the caller's frame.
-    Bytes(u32),
-    /// None could be found; why.
-    Unknown(String),
-}
+use crate::report::{Function, StackBound};
 
 /// The code of an image as far as the stack is concerned, by the address of each function.
 #[derive(Debug, Default)]

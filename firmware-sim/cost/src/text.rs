@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use super::count::TIME_SHIFT;
-use super::image::STARTUP;
-use super::{BlobCost, Cost, ImageCost, StackBound};
+use crate::count::TIME_SHIFT;
+use crate::image::STARTUP;
+use crate::report::{BlobCost, Cost, ImageCost, StackBound};
 
 /// How tables are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

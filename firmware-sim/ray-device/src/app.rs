@@ -379,6 +379,3 @@ fn measure_one(blob: &RayBlob<'_>, asked: &Match, health: &mut Health) -> Measur
         outcome: outcome.map(Point::from).map_err(MeasureError::code),
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -23,7 +23,7 @@ pub const fn max_encoded_length(length: usize) -> usize {
 /// # Example
 /// ```
 /// let mut out = [0; 8];
-/// assert_eq!(firmware_sim::cobs::encode(&[0x11, 0x00, 0x22], &mut out), Some(4));
+/// assert_eq!(ray_device::cobs::encode(&[0x11, 0x00, 0x22], &mut out), Some(4));
 /// assert_eq!(out[..4], [0x02, 0x11, 0x02, 0x22]);
 /// ```
 pub fn encode(message: &[u8], out: &mut [u8]) -> Option<usize> {

@@ -1,7 +1,6 @@
 //! What the application needs from the machine it runs on: a byte stream, flash, and a clock.
 //!
-//! The host implements these with a TCP stream and a simulated flash, the Cortex-M image with a UART,
-//! memory-mapped flash and a timer.
+//! A board implements these with a UART, memory-mapped flash and a timer; a test with whatever it likes.
 
 use embedded_storage::nor_flash::NorFlash;
 
@@ -23,6 +22,9 @@ pub trait Link {
     /// If the stream broke.
     fn write_all(&mut self, bytes: &[u8]) -> Result<(), Self::Error>;
 }
+
+/// Bytes of flash that are programmed at once. A flash whose own unit is smaller takes them, too.
+pub const UNIT: usize = 8;
 
 /// A part of the flash of its own: NOR flash that is programmed through a driver and read like
 /// memory.

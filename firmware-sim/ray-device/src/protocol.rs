@@ -28,10 +28,6 @@ pub const MAX_MATCHES: usize = 28;
 /// head.
 pub const MAX_CHUNK: usize = 896;
 
-/// Every chunk but the last has a multiple of so many bytes, so that flash can be programmed in whole
-/// units as chunks come.
-pub const CHUNK_UNIT: usize = 8;
-
 /// Cameras listed in a [`Status`]; a blob may hold more, [`BlobStatus::camera_count`] says how
 /// many.
 pub const MAX_CAMERAS_LISTED: usize = 8;
@@ -144,7 +140,8 @@ impl Signature {
 pub struct Chunk {
     /// Where in the blob it starts.
     pub offset: u32,
-    /// A multiple of [`CHUNK_UNIT`] bytes, unless it is the last.
+    /// A multiple of [`UNIT`](crate::port::UNIT) bytes, unless it is the last: whole units are programmed
+    /// as chunks come.
     pub bytes: Vec<u8, MAX_CHUNK>,
 }
 

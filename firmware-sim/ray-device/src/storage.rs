@@ -14,7 +14,7 @@
 //! The unit that was being programmed may have lost some of its bits, or read differently each time.
 //! What [`boot`] decides is therefore written down before the device serves: see [`log`].
 //!
-//! Assumed is that a cut hits one program unit of up to 8 bytes, or one erase block, and nothing that
+//! Assumed is that a cut hits one program unit of up to 8 bytes ([`UNIT`]), or one erase block, and nothing that
 //! was complete before.
 
 pub mod log;
@@ -26,7 +26,7 @@ use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 use ray_runtime::{OpenError, RayBlob};
 
 use crate::frame::checksum;
-use crate::port::{MappedFlash, Regions};
+use crate::port::{MappedFlash, Regions, UNIT};
 use crate::protocol::{FlashOperation, Refusal, SlotState, StoredBlob};
 use log::{Log, Record};
 
@@ -241,8 +241,11 @@ fn open_error(slots: [SlotState; 2]) -> u8 {
 
 /// Programs `bytes` at `start`, which may end inside a unit: the rest of it stays blank. Then reads
 /// back.
+///
+/// # Errors
+/// [`Refusal::FlashFailed`].
 #[inline(never)]
-pub(crate) fn program<R: NorFlash>(slot: &mut R, start: u32, bytes: &[u8]) -> Result<(), Refusal> {
+pub fn program<R: NorFlash>(slot: &mut R, start: u32, bytes: &[u8]) -> Result<(), Refusal> {
     for (address, unit) in (start..).step_by(UNIT).zip(bytes.chunks(UNIT)) {
         let mut padded = [0xff; UNIT];
         for (place, &byte) in padded.iter_mut().zip(unit) {
@@ -259,9 +262,6 @@ pub(crate) fn program<R: NorFlash>(slot: &mut R, start: u32, bytes: &[u8]) -> Re
     }
     Ok(())
 }
-
-/// Bytes that are programmed at once; a flash whose own unit is smaller takes them, too.
-pub const UNIT: usize = 8;
 
 fn read_unit<R: ReadNorFlash>(slot: &mut R, address: u32) -> Result<[u8; UNIT], Refusal> {
     let mut unit = [0; UNIT];

@@ -10,11 +10,11 @@ use std::time::{Duration, Instant};
 use ray_runtime::RayBlob;
 use thiserror::Error;
 
-use crate::frame::checksum;
-use crate::protocol::Rig;
-use crate::sim_flash::{BLOCK, SimFlash};
-use crate::storage::log::{Log, Record};
-use crate::storage::{program, rig};
+use crate::simulated::sim_flash::{BLOCK, SimFlash};
+use ray_device::frame::checksum;
+use ray_device::protocol::Rig;
+use ray_device::storage::log::{Log, Record};
+use ray_device::storage::{program, rig};
 
 /// Size of a device's flash, bytes: that of the board which QEMU emulates.
 pub const FLASH_LENGTH: usize = 16 << 20;

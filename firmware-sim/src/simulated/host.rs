@@ -11,16 +11,16 @@ use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::app::Device;
-use crate::flash_file;
-use crate::port::{Clock, Link};
-use crate::protocol::{Refusal, Reply, Request};
-use crate::session::{Paused, Responder, Session};
-use crate::sim_flash::SimFlash;
-use crate::storage::transfer::Peer;
-use crate::storage::trust::Trust;
+use crate::simulated::flash_file;
+use crate::simulated::sim_flash::SimFlash;
+use ray_device::app::Device;
+use ray_device::port::{Clock, Link};
+use ray_device::protocol::{Refusal, Reply, Request};
+use ray_device::session::{Paused, Responder, Session};
+use ray_device::storage::transfer::Peer;
+use ray_device::storage::trust::Trust;
 
-pub use crate::flash_file::FLASH_LENGTH;
+pub use crate::simulated::flash_file::FLASH_LENGTH;
 
 /// Peers at once; one more is turned away.
 const MAX_PEERS: usize = 16;

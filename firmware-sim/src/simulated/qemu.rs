@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use thiserror::Error;
 
 use crate::client::{ClientError, DeviceClient};
-use crate::flash_file::{self, FLASH_LENGTH, FlashFile, FlashFileError};
+use crate::simulated::flash_file::{self, FLASH_LENGTH, FlashFile, FlashFileError};
 
 use memory::{Backing, Memory};
 
@@ -333,7 +333,7 @@ const TARGET: &str = "thumbv7em-none-eabihf";
 const SOFT_FLOAT_TARGET: &str = "thumbv7em-none-eabi";
 
 /// The workspace's folder.
-pub(crate) fn root() -> &'static Path {
+fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
         .unwrap_or(Path::new("."))

@@ -22,15 +22,12 @@ use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase, check_write,
 };
 
-use crate::port::{MappedFlash, Regions};
-use crate::random::SplitMix;
-use crate::storage::Layout;
+use ray_device::port::{MappedFlash, Regions, UNIT};
+use ray_device::storage::Layout;
+use split_mix::SplitMix;
 
 /// Length of an erase block, bytes.
 pub const BLOCK: usize = 4096;
-
-/// Length of a program unit, bytes.
-pub const UNIT: usize = 8;
 
 /// What a cut of power leaves of the operation it hits. All bytes before the cut are done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

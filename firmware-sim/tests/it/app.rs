@@ -5,12 +5,12 @@ use rand_chacha::ChaCha8Rng;
 
 use ray_runtime::OpenError;
 
-use super::Device;
-use crate::frame::{FrameReader, FrameWriter, Received};
-use crate::port::Clock;
-use crate::protocol::{Match, NewBlob, Refusal, Reply, Request, Sighting, name};
-use crate::session::{Responder, Session};
-use crate::sim_flash::SimFlash;
+use firmware_sim::simulated::sim_flash::SimFlash;
+use ray_device::app::Device;
+use ray_device::frame::{FrameReader, FrameWriter, Received};
+use ray_device::port::Clock;
+use ray_device::protocol::{Match, NewBlob, Refusal, Reply, Request, Sighting, name};
+use ray_device::session::{Responder, Session};
 
 struct Stopped;
 
@@ -199,7 +199,7 @@ fn another_peers_update_is_in_the_way_until_it_has_been_silent_for_a_while() {
     let mut device = device.epoch(&mut regions);
     let [one, other] = [1, 2].map(|sum| Request::BeginUpdate(new_blob(100, sum)));
     let receiving = |received| Reply::Receiving { received };
-    let chunk = Request::Chunk(crate::protocol::Chunk {
+    let chunk = Request::Chunk(ray_device::protocol::Chunk {
         offset: 0,
         bytes: core::iter::repeat_n(7, 16).collect(),
     });
@@ -236,7 +236,10 @@ fn chunks_come_in_order_in_whole_units_and_a_repeat_is_acknowledged() {
     device.respond_to(0, &begin);
     let mut send = |offset, fill: u8, length| {
         let bytes = core::iter::repeat_n(fill, length).collect();
-        device.respond_to(0, &Request::Chunk(crate::protocol::Chunk { offset, bytes }))
+        device.respond_to(
+            0,
+            &Request::Chunk(ray_device::protocol::Chunk { offset, bytes }),
+        )
     };
     let bad = |missing| Reply::Refused(Refusal::BadChunk { missing });
     let expects = |expected| Reply::Refused(Refusal::WrongOffset { expected });
@@ -256,7 +259,7 @@ fn chunks_come_in_order_in_whole_units_and_a_repeat_is_acknowledged() {
         device.respond_to(0, &Request::FinishUpdate),
         Reply::Refused(Refusal::Incomplete { received: 24 })
     );
-    let last = Request::Chunk(crate::protocol::Chunk {
+    let last = Request::Chunk(ray_device::protocol::Chunk {
         offset: 24,
         bytes: core::iter::repeat_n(3, 6).collect(),
     });
@@ -267,7 +270,7 @@ fn chunks_come_in_order_in_whole_units_and_a_repeat_is_acknowledged() {
         panic!("another checksum was announced");
     };
     let sent = [vec![1; 16], vec![3; 14]].concat();
-    assert_eq!((announced, stored), (1, crate::frame::checksum(&sent)));
+    assert_eq!((announced, stored), (1, ray_device::frame::checksum(&sent)));
     // Given up with that.
     let none = Reply::Refused(Refusal::NoUpdate);
     assert_eq!(device.respond_to(0, &Request::FinishUpdate), none);
@@ -282,11 +285,11 @@ fn chunks_come_in_order_in_whole_units_and_a_repeat_is_acknowledged() {
 #[test]
 fn what_cannot_fit_or_is_for_another_rig_is_refused_before_anything_is_erased() {
     let mut flash = SimFlash::blank(5, 0).unwrap();
-    let own = crate::protocol::Rig {
+    let own = ray_device::protocol::Rig {
         serial: name("17"),
         cameras: heapless::Vec::new(),
     };
-    crate::storage::rig::write(&mut flash.regions().factory, &own).unwrap();
+    ray_device::storage::rig::write(&mut flash.regions().factory, &own).unwrap();
     let mut regions = flash.regions();
     let mut device = Device::new("a device", Stopped);
     let mut device = device.epoch(&mut regions);

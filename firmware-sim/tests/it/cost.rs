@@ -6,7 +6,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use firmware_sim::{cost, qemu};
+use firmware_cost as cost;
+use firmware_sim::simulated::qemu;
 use serde_json::Value;
 
 fn root() -> PathBuf {
@@ -201,7 +202,7 @@ fn what_cannot_be_counted_ends_with_code_2_and_its_reason() {
 #[test]
 fn the_document_was_written_by_the_program() {
     let document = std::fs::read_to_string(root().join("ray-runtime/COST.md")).unwrap();
-    assert!(document.starts_with(include_str!("../src/cost/method.md")));
+    assert!(document.starts_with(include_str!("../../cost/src/method.md")));
     let head = "| instructions ";
     assert!(document.contains(head), "no table");
 }

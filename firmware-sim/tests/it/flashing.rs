@@ -1,8 +1,5 @@
 //! Flashing over TCP: what arrives, what is refused, links that break, devices that are killed.
 
-mod rig;
-mod running;
-
 use std::io::{Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
@@ -12,16 +9,17 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use crate::rig;
+use crate::running::Running;
 use firmware_sim::client::{Begun, ClientError, DeviceClient, FlashOptions};
-use firmware_sim::flash_file;
-use firmware_sim::frame::{FrameWriter, checksum};
-use firmware_sim::host::SimulatedDevice;
-use firmware_sim::protocol::{
-    CameraStatus, Chunk, IDENTITY_LENGTH, NewBlob, Refusal, Request, Rig, RigPart, SlotState, name,
-};
+use firmware_sim::simulated::flash_file;
+use firmware_sim::simulated::host::SimulatedDevice;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use running::Running;
+use ray_device::frame::{FrameWriter, checksum};
+use ray_device::protocol::{
+    CameraStatus, Chunk, IDENTITY_LENGTH, NewBlob, Refusal, Request, Rig, RigPart, SlotState, name,
+};
 
 const OTHER: [u8; IDENTITY_LENGTH] = *b"another identity";
 
@@ -123,7 +121,7 @@ fn a_blob_for_other_cameras_does_not_cost_the_blob_before() {
     let mut flash = |blob: &[u8]| client.flash(blob, &FlashOptions::default(), &mut |_| {});
     flash(&rig::blob()).unwrap();
     flash(&rig::blob_of(OTHER)).unwrap();
-    let another_rigs = include_bytes!("../../data/golden/stereo-v2.rays");
+    let another_rigs = include_bytes!("../../../data/golden/stereo-v2.rays");
     let refused = refusal(flash(another_rigs));
     assert!(matches!(refused, Refusal::OtherRig { .. }), "{refused:?}");
     let stored = client.rollback().unwrap();

@@ -2,18 +2,17 @@
 //! again while the device recovers; bits that flip at rest; flash that fails. Always exactly the old
 //! or the new blob, boot after boot the same one, and the device can be flashed again.
 //!
-//! `cargo test --release -p firmware-sim --test power_cuts -- --nocapture` prints how many runs.
+//! `cargo test --release -p firmware-sim --test it power_cuts -- --nocapture` prints how many runs.
 
-mod rig;
-
-use firmware_sim::app::Device;
-use firmware_sim::frame::checksum;
-use firmware_sim::port::Clock;
-use firmware_sim::protocol::{
+use crate::rig;
+use firmware_sim::simulated::sim_flash::{BLOCK, Cut, PowerCut, SimFlash};
+use ray_device::app::Device;
+use ray_device::frame::checksum;
+use ray_device::port::{Clock, UNIT};
+use ray_device::protocol::{
     Chunk, MAX_CHUNK, NewBlob, Refusal, Reply, Request, SlotState, Status, StoredBlob,
 };
-use firmware_sim::random::SplitMix;
-use firmware_sim::sim_flash::{BLOCK, Cut, PowerCut, SimFlash, UNIT};
+use split_mix::SplitMix;
 
 /// The factory block, and two slots of a log and two blocks for a blob.
 const BLOCKS: usize = 1 + 2 * 3;

@@ -3,20 +3,18 @@
 //! Needs QEMU and a bare-metal toolchain; where they are missing these tests fail and name what to
 //! install. `tests/run` installs them first.
 
-mod rig;
-mod running;
-
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+use crate::rig;
+use crate::running::Running;
 use firmware_sim::client::{DeviceClient, FlashOptions};
-use firmware_sim::protocol::Measured;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use running::Running;
+use ray_device::protocol::Measured;
 
 fn bits(measured: &Measured) -> (u32, Result<[Option<u32>; 7], u8>) {
     (measured.id, measured.outcome.map(|point| point.to_bits()))

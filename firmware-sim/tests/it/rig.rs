@@ -1,10 +1,9 @@
 //! A stereo blob made by hand from the runtime's schema, and matches on it: small, but with a
 //! central and a non-central camera, knots and nodes that no formula gives, and a hole in a mask.
-#![allow(dead_code, reason = "each test takes what it needs")]
 
-use firmware_sim::protocol::{Match, Sighting};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use ray_device::protocol::{Match, Sighting};
 use ray_runtime::format::{
     ALIGNMENT, Axis, CRC_OFFSET, CameraMeta, Encoding, Form, HEADER_LEN, Header, LengthUnit, Meta,
     NODE_LEN, PairHeader, PixelConvention, RECORD_LEN, RecordFields, VERSION, aligned, checksum,

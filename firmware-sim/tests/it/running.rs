@@ -1,5 +1,4 @@
 //! A `firmware-sim` process with a device in it.
-#![allow(dead_code, reason = "each test takes what it needs")]
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;

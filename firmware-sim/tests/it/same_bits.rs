@@ -3,8 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
-use firmware_sim::qemu;
-use firmware_sim::same_bits::{Digest, digest};
+use firmware_cost::same_bits::{Digest, digest};
+use firmware_sim::simulated::qemu;
 use ray_runtime::RayBlob;
 
 const MATCHES: u32 = 100_000;

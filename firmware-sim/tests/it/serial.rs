@@ -1,19 +1,16 @@
 //! Over a serial port: a pseudo terminal, with the device behind it.
 
-#![cfg(unix)]
-
-mod rig;
-
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Write};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use firmware_sim::app::Device;
+use crate::rig;
 use firmware_sim::client::{ClientError, DeviceClient, FlashOptions};
-use firmware_sim::port::{Clock, Link};
-use firmware_sim::session::Session;
-use firmware_sim::sim_flash::SimFlash;
+use firmware_sim::simulated::sim_flash::SimFlash;
+use ray_device::app::Device;
+use ray_device::port::{Clock, Link};
+use ray_device::session::Session;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 
 struct HostClock(Instant);

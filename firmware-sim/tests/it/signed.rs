@@ -1,14 +1,13 @@
 //! A device that takes only blobs signed by the owner of one key, on the host and in QEMU.
 
-mod rig;
-
+use crate::rig;
 use ed25519_dalek::{Signer, SigningKey};
 use firmware_sim::client::{ClientError, DeviceClient, FlashOptions, Flashed};
-use firmware_sim::flash_file;
-use firmware_sim::host::SimulatedDevice;
-use firmware_sim::protocol::{Refusal, Signature};
-use firmware_sim::qemu::{self, QemuDevice};
-use firmware_sim::storage::trust::{PublicKey, Trust};
+use firmware_sim::simulated::flash_file;
+use firmware_sim::simulated::host::SimulatedDevice;
+use firmware_sim::simulated::qemu::{self, QemuDevice};
+use ray_device::protocol::{Refusal, Signature};
+use ray_device::storage::trust::{PublicKey, Trust};
 
 fn key(seed: u8) -> SigningKey {
     SigningKey::from_bytes(&[seed; 32])
@@ -94,7 +93,7 @@ fn a_device_without_a_key_takes_any_blob_signed_or_not() {
 #[test]
 fn the_image_in_qemu_takes_signed_blobs_only() {
     let owner = key(7);
-    let image = qemu::build_signed_image("device_signed", &public(&owner).to_hex()).unwrap();
+    let image = qemu::build_signed_image("device_signed", &public(&owner).to_string()).unwrap();
     let device = QemuDevice::start("127.0.0.1:0".parse().unwrap(), &image, None).unwrap();
     let mut client = DeviceClient::connect(&format!("tcp:{}", device.address())).unwrap();
     check(&mut client, &owner);
@@ -106,7 +105,8 @@ fn the_image_in_qemu_takes_signed_blobs_only() {
 fn verifying_takes_a_counted_number_of_instructions() {
     // QEMU's time per instruction is 2^10 ns, a tick of the timer 40 ns.
     const TICKS_PER_INSTRUCTION: f64 = 1024.0 / 40.0;
-    let image = qemu::build_signed_image("counting_signature", &public(&key(7)).to_hex()).unwrap();
+    let image =
+        qemu::build_signed_image("counting_signature", &public(&key(7)).to_string()).unwrap();
     let blob = tempfile::NamedTempFile::new().unwrap();
     let output = qemu::run_counting(&image, blob.path(), 10).unwrap();
     assert!(output.status.success());

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use firmware_sim::qemu;
+use firmware_sim::simulated::qemu;
 
 #[test]
 fn check_images_print_what_they_should() {

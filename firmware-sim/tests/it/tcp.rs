@@ -1,16 +1,15 @@
 //! The simulated device on the host, end to end over TCP.
 
-mod rig;
-
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::time::{Duration, Instant};
 
+use crate::rig;
 use firmware_sim::client::{ClientError, DeviceClient};
-use firmware_sim::host::{FLASH_LENGTH, SimulatedDevice};
-use firmware_sim::protocol::{Match, Point, Refusal};
+use firmware_sim::simulated::host::{FLASH_LENGTH, SimulatedDevice};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use ray_device::protocol::{Match, Point, Refusal};
 use ray_runtime::{Aligned, MeasureError, OpenError, PixelPoint, RayBlob};
 
 fn device(flash: &[u8]) -> (SimulatedDevice, DeviceClient) {
@@ -21,7 +20,7 @@ fn device(flash: &[u8]) -> (SimulatedDevice, DeviceClient) {
 
 /// What the runtime says in this very process.
 fn expected(blob: &RayBlob<'_>, asked: &Match) -> Result<Point, u8> {
-    let pixel = |sighting: firmware_sim::protocol::Sighting| {
+    let pixel = |sighting: ray_device::protocol::Sighting| {
         (
             usize::from(sighting.camera),
             PixelPoint::new(sighting.u_px, sighting.v_px),

@@ -1,7 +1,7 @@
 use super::*;
-use crate::random::SplitMix;
 use nalgebra::{Matrix3, Vector3};
 use ray_runtime::{PointCovariance, Triangulation};
+use split_mix::SplitMix;
 
 fn measurement(gap_mm: f32, sigma_mm: Option<f32>) -> Measurement {
     Measurement {

@@ -18,8 +18,9 @@
 
 use embedded_storage::nor_flash::NorFlash;
 
-use super::{UNIT, program};
+use super::program;
 use crate::frame::checksum;
+use crate::port::UNIT;
 use crate::protocol::{FlashOperation, Refusal};
 
 /// Length of an entry, its seal included, bytes.

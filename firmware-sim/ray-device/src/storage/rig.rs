@@ -7,7 +7,7 @@
 
 use ray_runtime::RayBlob;
 
-use crate::frame::checksum;
+use crate::frame::{MAX_MESSAGE, checksum};
 use crate::port::MappedFlash;
 use crate::protocol::{Refusal, Rig, RigPart};
 
@@ -33,16 +33,19 @@ pub fn read<R: MappedFlash>(factory: &R) -> Option<Rig> {
 ///
 /// # Errors
 /// [`Refusal::FlashFailed`].
-#[cfg(feature = "std")]
 pub fn write<R: MappedFlash>(factory: &mut R, rig: &Rig) -> Result<(), Refusal> {
-    let mut message = [0; crate::frame::MAX_MESSAGE];
+    let mut record = [0; HEAD_LENGTH + MAX_MESSAGE];
+    let (head, message) = record.split_at_mut(HEAD_LENGTH);
     // It is part of every status, which fits such a buffer.
-    let message = postcard::to_slice(rig, &mut message).map_err(|_| Refusal::BadFrame)?;
-    let mut bytes = MAGIC.to_vec();
-    bytes.extend((message.len() as u32).to_le_bytes());
-    bytes.extend(checksum(message).to_le_bytes());
-    bytes.extend_from_slice(message);
-    super::program(factory, 0, &bytes)
+    let message = postcard::to_slice(rig, message).map_err(|_| Refusal::BadFrame)?;
+    let length = message.len();
+    let numbers = [length as u32, checksum(message)].map(u32::to_le_bytes);
+    let bytes = MAGIC.iter().chain(numbers.as_flattened());
+    for (place, &byte) in head.iter_mut().zip(bytes) {
+        *place = byte;
+    }
+    let record = record.get(..HEAD_LENGTH + length).unwrap_or_default();
+    super::program(factory, 0, record)
 }
 
 /// Compares a blob with the device's cameras: how many, and of each in order the name and the size

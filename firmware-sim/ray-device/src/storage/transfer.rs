@@ -6,8 +6,8 @@ use ray_runtime::format::HEADER_LEN;
 
 use super::log::{Log, Record, erase_block};
 use super::trust::Trust;
-use super::{UNIT, blob_bytes, blob_of, max_blob, program, rig};
-use crate::port::MappedFlash;
+use super::{blob_bytes, blob_of, max_blob, program, rig};
+use crate::port::{MappedFlash, UNIT};
 use crate::protocol::{Chunk, FlashOperation, NewBlob, Refusal, Rig, RigPart, UpdateStatus};
 
 /// Who asks: one number for each link, or each connection.

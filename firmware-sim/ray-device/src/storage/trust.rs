@@ -89,18 +89,6 @@ impl PublicKey {
         Some(Self(key))
     }
 
-    /// Its 64 hexadecimal digits.
-    #[cfg(feature = "std")]
-    pub fn to_hex(&self) -> std::string::String {
-        use core::fmt::Write;
-        let mut hex = std::string::String::with_capacity(64);
-        for byte in self.0 {
-            // Writing to a string cannot fail.
-            let _ = write!(hex, "{byte:02x}");
-        }
-        hex
-    }
-
     /// Whether the owner of the key signed these bytes.
     #[cold]
     #[inline(never)]
@@ -108,6 +96,14 @@ impl PublicKey {
         let signature = ed25519_dalek::Signature::from_components(signature.r, signature.s);
         ed25519_dalek::VerifyingKey::from_bytes(&self.0)
             .is_ok_and(|key| key.verify_strict(bytes, &signature).is_ok())
+    }
+}
+
+/// Its 64 hexadecimal digits.
+#[cfg(feature = "signed")]
+impl core::fmt::Display for PublicKey {
+    fn fmt(&self, out: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        self.0.iter().try_for_each(|byte| write!(out, "{byte:02x}"))
     }
 }
 

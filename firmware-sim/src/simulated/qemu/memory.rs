@@ -7,7 +7,7 @@ use std::process::Stdio;
 use tempfile::NamedTempFile;
 
 use super::QemuError;
-use crate::flash_file::{FLASH_LENGTH, FlashFile, Kept};
+use crate::simulated::flash_file::{FLASH_LENGTH, FlashFile, Kept};
 
 /// Where the emulated flash starts in the board's memory.
 const FLASH_START: usize = 0x2100_0000;

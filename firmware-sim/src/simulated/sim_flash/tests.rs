@@ -2,8 +2,8 @@
 
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 
-use super::{BLOCK, Cut, PowerCut, SimFlash, SimFlashError, UNIT};
-use crate::port::MappedFlash;
+use super::{BLOCK, Cut, PowerCut, SimFlash, SimFlashError};
+use ray_device::port::{MappedFlash, UNIT};
 
 fn flash() -> SimFlash {
     SimFlash::blank(5, 1).unwrap()
