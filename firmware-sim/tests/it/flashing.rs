@@ -1,6 +1,6 @@
 //! Flashing over TCP: what arrives, what is refused, links that break, devices that are killed.
 
-use std::io::{Read, Write};
+use std::io::{BufReader, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
 use std::process::Command;
@@ -16,9 +16,10 @@ use firmware_sim::simulated::flash_file;
 use firmware_sim::simulated::host::SimulatedDevice;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use ray_device::frame::{FrameWriter, checksum};
+use ray_device::frame::{DELIMITER, FrameReader, FrameWriter, checksum};
 use ray_device::protocol::{
-    CameraStatus, Chunk, IDENTITY_LENGTH, NewBlob, Refusal, Request, Rig, RigPart, SlotState, name,
+    CameraStatus, Chunk, IDENTITY_LENGTH, NewBlob, Refusal, Reply, Request, Rig, RigPart,
+    SlotState, name,
 };
 
 const OTHER: [u8; IDENTITY_LENGTH] = *b"another identity";
@@ -243,6 +244,7 @@ fn a_link_that_keeps_breaking_is_resumed_where_it_stopped() {
 /// the active blob answers the same bits throughout, and a good update goes through in the end.
 #[test]
 fn fuzzed_frames_during_an_update_do_not_touch_the_active_blob() {
+    const LAST: u16 = 2;
     let (device, mut client) = device(&rig::blob());
     let asked = rig::matches(28, 4);
     let bits = |client: &mut DeviceClient| format!("{:?}", client.measure(&asked).unwrap());
@@ -250,6 +252,9 @@ fn fuzzed_frames_during_an_update_do_not_touch_the_active_blob() {
     let mut random = ChaCha8Rng::seed_from_u64(5);
     let mut stream = TcpStream::connect(device.address()).unwrap();
     stream.set_nodelay(true).unwrap();
+    stream
+        .set_read_timeout(Some(Duration::from_secs(30)))
+        .unwrap();
     let other = rig::blob_of(OTHER);
     let mut writer = FrameWriter::new();
     let mut frames = 0;
@@ -289,16 +294,19 @@ fn fuzzed_frames_during_an_update_do_not_touch_the_active_blob() {
             bytes.extend(frame);
             frames += 1;
         }
-        let mut answers = stream.try_clone().unwrap();
+        // Whatever they were, this one is a frame again, and answered last.
+        bytes.push(DELIMITER);
+        bytes.extend(writer.seal(LAST, &Request::Hello).unwrap());
+        let answers = BufReader::new(stream.try_clone().unwrap());
         let reader = thread::spawn(move || {
-            let mut buffer = [0; 4096];
-            answers
-                .set_read_timeout(Some(Duration::from_millis(20)))
-                .unwrap();
-            while answers.read(&mut buffer).is_ok_and(|length| length > 0) {}
+            let mut frames = FrameReader::new();
+            answers.bytes().map_while(Result::ok).any(|byte| {
+                let frame = frames.push::<Reply>(byte);
+                frame.is_some_and(|frame| frame.is_ok_and(|frame| frame.sequence == LAST))
+            })
         });
         stream.write_all(&bytes).unwrap();
-        reader.join().unwrap();
+        assert!(reader.join().unwrap(), "round {round}: no answer");
         if round % 10 == 0 {
             assert_eq!(bits(&mut client), expected, "round {round}");
             assert_eq!(active(&mut client), Ok(rig::IDENTITY));

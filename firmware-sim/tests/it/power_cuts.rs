@@ -4,6 +4,8 @@
 //!
 //! `cargo test --release -p firmware-sim --test it power_cuts -- --nocapture` prints how many runs.
 
+use std::sync::LazyLock;
+
 use crate::rig;
 use firmware_sim::simulated::sim_flash::{BLOCK, Cut, PowerCut, SimFlash};
 use ray_device::app::Device;
@@ -125,6 +127,7 @@ fn survive(
     seed: u64,
     either: [[u8; 16]; 2],
 ) -> [u8; 16] {
+    static UPDATE_TO_NEXT: LazyLock<Vec<Request>> = LazyLock::new(|| update_to(NEXT));
     let context = || format!("{cuts:?}, seed {seed}");
     let mut flash = copy(before, seed);
     flash.plan_cut(cuts.first().copied());
@@ -154,7 +157,7 @@ fn survive(
     let is_sound = cuts.iter().all(|cut| cut.cut != Cut::Weak);
     let limit = if is_sound { 0 } else { 2 * ENTRY_UNITS };
     assert!(written <= limit, "{written} operations: {}", context());
-    if let Err(refusal) = ask(&mut flash, &update_to(NEXT)) {
+    if let Err(refusal) = ask(&mut flash, &UPDATE_TO_NEXT) {
         panic!("not flashable, {refusal}: {}", context());
     }
     assert_eq!(active(&mut flash), Some(NEXT), "{}", context());

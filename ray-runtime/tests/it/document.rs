@@ -4,7 +4,7 @@
 use crate::test_blob::repair_checksum;
 use ray_runtime::format::Header;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
 fn golden() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/golden");
@@ -20,43 +20,49 @@ fn golden() -> Vec<PathBuf> {
     files
 }
 
-fn read(blob: &Path) -> Output {
-    read_with("read_blob.py", blob)
+/// What a reader made of a blob.
+struct Read {
+    code: i32,
+    printed: String,
+    said: String,
 }
 
-fn read_with(reader: &str, blob: &Path) -> Output {
+/// Runs a reader on each of these.
+fn read(reader: &str, blobs: &[PathBuf]) -> Vec<Read> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it");
-    Command::new("python3")
+    let output = Command::new("python3")
         // Without the folder of compiled modules that Python would leave here.
         .arg("-B")
-        .arg(folder.join(reader))
-        .arg(blob)
+        .args([folder.join("read_each.py"), folder.join(reader)])
+        .args(blobs)
         .output()
-        .expect("python3 is missing: install Python 3, which checks that FORMAT.md is right")
-}
-
-fn text(bytes: &[u8]) -> &str {
-    std::str::from_utf8(bytes).unwrap()
+        .expect("python3 is missing: install Python 3, which checks that FORMAT.md is right");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{}: {said}", output.status);
+    let answers = String::from_utf8(output.stdout).unwrap();
+    let answers: Vec<&str> = answers.split_terminator('\0').collect();
+    let (answers, rest) = answers.as_chunks::<3>();
+    assert!(answers.len() == blobs.len() && rest.is_empty(), "{said}");
+    let read = |[code, printed, said]: &[&str; 3]| Read {
+        code: code.parse().unwrap(),
+        printed: (*printed).to_owned(),
+        said: (*said).to_owned(),
+    };
+    answers.iter().map(read).collect()
 }
 
 #[test]
 fn a_reader_written_from_the_document_gives_the_bits_of_every_golden_blob() {
     let mut versions = Vec::new();
-    for path in golden() {
-        let (_, header) = Header::read(&std::fs::read(&path).unwrap()).unwrap();
+    let golden = golden();
+    for (path, found) in golden.iter().zip(read("read_blob.py", &golden)) {
+        let (_, header) = Header::read(&std::fs::read(path).unwrap()).unwrap();
         versions.push(header.version);
-        let output = read(&path);
-        let (printed, said) = (text(&output.stdout), text(&output.stderr));
-        assert!(
-            output.status.success(),
-            "{}: {}\n{printed}{said}",
-            path.display(),
-            output.status
-        );
+        let (name, printed) = (path.display(), &found.printed);
+        assert_eq!(found.code, 0, "{name}: {printed}{}", found.said);
         assert!(
             printed.ends_with("4 rays and 4 matches, 0 with other bits\n"),
-            "{}: {printed}",
-            path.display()
+            "{name}: {printed}"
         );
     }
     versions.sort_unstable();
@@ -66,18 +72,17 @@ fn a_reader_written_from_the_document_gives_the_bits_of_every_golden_blob() {
 
 #[test]
 fn the_documents_covariance_gives_the_bits_of_every_golden_blob() {
-    for path in golden() {
-        let (_, header) = Header::read(&std::fs::read(&path).unwrap()).unwrap();
-        let output = read_with("read_uncertainty.py", &path);
-        let (printed, said) = (text(&output.stdout), text(&output.stderr));
+    let golden = golden();
+    for (path, found) in golden.iter().zip(read("read_uncertainty.py", &golden)) {
+        let (_, header) = Header::read(&std::fs::read(path).unwrap()).unwrap();
         let count = if header.version == 1 { 0 } else { 2 };
+        let (name, said) = (path.display(), &found.said);
         assert_eq!(
-            printed,
+            found.printed,
             format!("{count} uncertainties, 0 with other bits\n"),
-            "{}: {said}",
-            path.display()
+            "{name}: {said}"
         );
-        assert!(output.status.success());
+        assert_eq!(found.code, 0, "{name}: {said}");
     }
 }
 
@@ -88,20 +93,22 @@ fn the_reader_has_at_most_a_hundred_lines() {
     assert!(lines.count() <= 100);
 }
 
-/// Writes a damaged copy of a blob for the reader, and what it makes of it.
-fn read_damaged(path: &Path, name: &str, damage: impl Fn(&mut Vec<u8>)) -> Output {
+/// Writes a damaged copy of a blob for the reader.
+fn damaged(path: &Path, name: &str, damage: impl Fn(&mut Vec<u8>)) -> PathBuf {
     let mut bytes = std::fs::read(path).unwrap();
     damage(&mut bytes);
-    let copy = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let blob = path.file_name().unwrap().to_str().unwrap();
+    let copy = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-{blob}"));
     std::fs::write(&copy, bytes).unwrap();
-    read(&copy)
+    copy
 }
 
 #[test]
 fn the_reader_refuses_damage() {
+    let mut copies = Vec::new();
+    let mut cut_short = Vec::new();
     for path in golden() {
         let length = std::fs::metadata(&path).unwrap().len() as usize;
-        let name = path.file_name().unwrap().to_str().unwrap();
         // Magic, version, lengths, checksum, metadata, and bits all over the rest.
         for at in [
             0,
@@ -116,32 +123,42 @@ fn the_reader_refuses_damage() {
             length / 2,
             length - 1,
         ] {
-            let output = read_damaged(&path, name, |bytes| bytes[at] ^= 1 << (at % 8));
-            assert_eq!(output.status.code(), Some(1), "{name}: byte {at}");
-            let said = text(&output.stderr);
-            assert!(said.starts_with("refused: "), "{name}: byte {at}: {said}");
+            copies.push(damaged(&path, &format!("byte-{at}"), |bytes| {
+                bytes[at] ^= 1 << (at % 8);
+            }));
         }
-        let output = read_damaged(&path, name, |bytes| bytes.truncate(length - 8));
-        assert_eq!(output.status.code(), Some(1), "{name}");
-        let output = read_damaged(&path, name, |bytes| bytes.truncate(20));
-        assert_eq!(output.status.code(), Some(1), "{name}");
+        for length in [length - 8, 20] {
+            let name = format!("cut-{length}");
+            cut_short.push(damaged(&path, &name, |bytes| bytes.truncate(length)));
+        }
+    }
+    for (path, found) in copies.iter().zip(read("read_blob.py", &copies)) {
+        let (name, said) = (path.display(), &found.said);
+        assert_eq!(found.code, 1, "{name}: {said}");
+        assert!(said.starts_with("refused: "), "{name}: {said}");
+    }
+    for (path, found) in cut_short.iter().zip(read("read_blob.py", &cut_short)) {
+        assert_eq!(found.code, 1, "{}: {}", path.display(), found.said);
     }
 }
 
 /// Were the reader to pass everything, the first test would say nothing.
 #[test]
 fn the_reader_sees_a_changed_table() {
-    for path in golden() {
-        let name = format!("changed-{}", path.file_name().unwrap().to_str().unwrap());
-        let output = read_damaged(&path, &name, |bytes| {
-            let header = Header::read(bytes).unwrap().1;
-            let records = (24 + header.meta_len as usize).next_multiple_of(8);
-            // The first camera's translation along x.
-            bytes[records + 4 * 29] ^= 1;
-            repair_checksum(bytes);
-        });
-        assert_eq!(output.status.code(), Some(1), "{name}");
-        let printed = text(&output.stdout);
+    let change = |bytes: &mut Vec<u8>| {
+        let header = Header::read(bytes).unwrap().1;
+        let records = (24 + header.meta_len as usize).next_multiple_of(8);
+        // The first camera's translation along x.
+        bytes[records + 4 * 29] ^= 1;
+        repair_checksum(bytes);
+    };
+    let copies: Vec<PathBuf> = golden()
+        .iter()
+        .map(|path| damaged(path, "changed", change))
+        .collect();
+    for (path, found) in copies.iter().zip(read("read_blob.py", &copies)) {
+        let (name, printed) = (path.display(), &found.printed);
+        assert_eq!(found.code, 1, "{name}");
         assert!(printed.contains("4 rays and 4 matches, "), "{printed}");
         assert!(!printed.contains(", 0 with other bits"), "{printed}");
     }
