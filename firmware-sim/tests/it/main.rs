@@ -4,6 +4,8 @@
 mod app;
 mod power_cuts;
 mod rig;
+mod snapshots;
+mod tcp;
 
 #[cfg(feature = "command")]
 mod cost;
@@ -17,9 +19,5 @@ mod running;
 mod same_bits;
 #[cfg(all(feature = "serial", unix))]
 mod serial;
-#[cfg(all(feature = "signed", feature = "simulated"))]
+#[cfg(feature = "signed")]
 mod signed;
-#[cfg(feature = "simulated")]
-mod snapshots;
-#[cfg(feature = "simulated")]
-mod tcp;
