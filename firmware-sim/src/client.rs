@@ -10,8 +10,8 @@ use std::collections::VecDeque;
 use std::io::ErrorKind;
 use std::time::{Duration, Instant};
 
-use crate::frame::{DELIMITER, FrameReader, FrameWriter, NO_SEQUENCE, Received, Rejected};
-use crate::protocol::{
+use ray_device::frame::{DELIMITER, FrameReader, FrameWriter, NO_SEQUENCE, Received, Rejected};
+use ray_device::protocol::{
     Hello, MAX_MATCHES, Match, Measured, Refusal, Reply, Request, SelfTestReport, Status,
     StoredBlob,
 };
@@ -28,7 +28,7 @@ pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(5);
 /// # Example
 /// ```
 /// use firmware_sim::client::DeviceClient;
-/// use firmware_sim::host::SimulatedDevice;
+/// use firmware_sim::simulated::host::SimulatedDevice;
 ///
 /// let device = SimulatedDevice::start("127.0.0.1:0".parse()?, &[])?;
 /// let mut client = DeviceClient::connect(&format!("tcp:{}", device.address()))?;

@@ -21,6 +21,7 @@ pub use quantized::{
     QuantizedMap, UNITS_PER_STEP, places_per_px,
 };
 pub(crate) use quantized::{QUANTIZED_HEADER_PAIRS, knots_len};
+pub(crate) use record::is_moderate;
 pub use record::{RECORD_LEN, RECORD_WORDS, Record, RecordFields};
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};

@@ -9,7 +9,7 @@ use calib_rays::progress::Progress;
 use calib_recording::dataset::identity::hex;
 use clap::Args;
 use firmware_sim::client::{FlashOptions, FlashProgress};
-use firmware_sim::protocol::Signature;
+use ray_device::protocol::Signature;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Duration;

@@ -2,9 +2,9 @@
 //! simulated device.
 
 use crate::common::{Run, contents, run};
-use firmware_sim::flash_file;
-use firmware_sim::host::SimulatedDevice;
-use firmware_sim::storage::trust::{PublicKey, Trust};
+use firmware_sim::simulated::flash_file;
+use firmware_sim::simulated::host::SimulatedDevice;
+use ray_device::storage::trust::{PublicKey, Trust};
 use ray_runtime::{Aligned, PixelPoint, RayBlob};
 use std::fmt::Write as _;
 use std::fs;

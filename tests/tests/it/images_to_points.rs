@@ -9,9 +9,9 @@ use calib_offline::report::Calibration;
 use calib_rays::geometry::PixelPoint;
 use calib_simulate::{MatchSet, OpticsKind, Scene};
 use firmware_sim::client::DeviceClient;
-use firmware_sim::flash_file::FlashFile;
-use firmware_sim::host::SimulatedDevice;
-use firmware_sim::qemu::{QemuDevice, build_image};
+use firmware_sim::simulated::flash_file::FlashFile;
+use firmware_sim::simulated::host::SimulatedDevice;
+use firmware_sim::simulated::qemu::{QemuDevice, build_image};
 use ray_runtime::RayBlob;
 use workspace_tests::{
     aligned, calibrate, loopback, measure_on_device, packed, pairs, record, small_scene,
