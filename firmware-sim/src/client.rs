@@ -1,5 +1,6 @@
 //! The workstation's side: a device as something that can be asked.
 
+mod address;
 mod error;
 mod flash;
 #[cfg(feature = "serial")]
@@ -114,7 +115,7 @@ impl DeviceClient {
     pub fn reconnect(&mut self) -> Result<(), ClientError> {
         // The old one first: a serial port can be open only once.
         self.transport = None;
-        self.transport = Some(transport::open(&self.address, self.timeout)?);
+        self.transport = Some(address::open(&self.address, self.timeout)?);
         self.start_over()
     }
 

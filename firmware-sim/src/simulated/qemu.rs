@@ -1,6 +1,9 @@
 //! The same application as a Cortex-M4F image in QEMU, its UART on a TCP port.
 
+mod error;
 mod memory;
+
+pub use error::QemuError;
 
 use std::io::ErrorKind;
 use std::net::{SocketAddr, TcpListener};
@@ -10,10 +13,8 @@ use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use thiserror::Error;
-
-use crate::client::{ClientError, DeviceClient};
-use crate::simulated::flash_file::{self, FLASH_LENGTH, FlashFile, FlashFileError};
+use crate::client::DeviceClient;
+use crate::simulated::flash_file::{self, FlashFile};
 
 use memory::{Backing, Memory};
 
@@ -41,67 +42,6 @@ status=$?
 kill -KILL $watchdog 2>/dev/null
 exit $status
 "#;
-
-/// Why there is no device in QEMU.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum QemuError {
-    /// QEMU is not installed.
-    #[error(
-        "qemu-system-arm is not installed: apt-get install qemu-system-arm, or run scripts/install-embedded.sh"
-    )]
-    NotInstalled,
-    /// The sources of the image are not where this program was built.
-    #[error("no sources for the image at {}: run from a checkout, or give an image with --image", path.display())]
-    NoSources {
-        /// The folder looked for.
-        path: PathBuf,
-    },
-    /// An image could not be built.
-    #[error("`{image}` could not be built ({status}): see the messages above")]
-    Build {
-        /// Its name, or their names.
-        image: String,
-        /// How the build ended.
-        status: ExitStatus,
-    },
-    /// A program could not be started, or a file not be read.
-    #[error("{what}")]
-    Io {
-        /// Program or file.
-        what: String,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The file cannot be the device's flash.
-    #[error(transparent)]
-    FlashFile(#[from] FlashFileError),
-    /// The contents for the flash are too long.
-    #[error("{} has {length} bytes, and the flash only {FLASH_LENGTH}", path.display())]
-    FlashTooLong {
-        /// The file.
-        path: PathBuf,
-        /// Its length, bytes.
-        length: u64,
-    },
-    /// The address cannot be listened on.
-    #[error("cannot listen on {address}")]
-    Listen {
-        /// As given.
-        address: SocketAddr,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// QEMU ended before the device answered.
-    #[error("QEMU ended before the device answered ({status}): see its message above")]
-    Ended {
-        /// How.
-        status: ExitStatus,
-    },
-    /// The device did not answer.
-    #[error("QEMU runs, but the device in it does not answer")]
-    Silent(#[source] ClientError),
-}
 
 /// A device in QEMU. It ends when this is dropped, and when this process ends in any way.
 #[derive(Debug)]

@@ -1,6 +1,7 @@
 //! What a lookup needs of a camera, at fixed places.
 
-use super::{Axis, MAX_MAGNITUDE};
+use super::axis::Axis;
+use super::header::MAX_MAGNITUDE;
 
 /// Words of 4 bytes in a camera's record.
 pub const RECORD_WORDS: usize = 32;

@@ -6,7 +6,7 @@ use std::process::Stdio;
 
 use tempfile::NamedTempFile;
 
-use super::QemuError;
+use super::error::QemuError;
 use crate::simulated::flash_file::{FLASH_LENGTH, FlashFile, Kept};
 
 /// Where the emulated flash starts in the board's memory.
