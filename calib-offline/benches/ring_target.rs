@@ -4,7 +4,7 @@
 //! `cargo bench -p calib-offline --bench ring_target`. Rendered images of 1280 x 1024, the left
 //! camera; every figure is over all markers found in the row's images.
 
-#[path = "../tests/common/ring_shots.rs"]
+#[path = "../recording/tests/it/ring_shots.rs"]
 mod ring_shots;
 
 use calib_simulate::OpticsKind;

@@ -5,9 +5,9 @@
 use std::time::Instant;
 
 use firmware_sim::client::{DeviceClient, FlashOptions};
-use firmware_sim::host::SimulatedDevice;
-use firmware_sim::protocol::{Match, Sighting};
-use firmware_sim::random::SplitMix;
+use firmware_sim::simulated::host::SimulatedDevice;
+use ray_device::protocol::{Match, Sighting};
+use split_mix::SplitMix;
 
 const MATCHES: usize = 500_000;
 const ROUNDS: usize = 3;

@@ -6,10 +6,10 @@
 use std::time::Instant;
 
 use firmware_sim::client::{DeviceClient, FlashOptions};
-use firmware_sim::flash_file::FlashFile;
-use firmware_sim::frame::checksum;
-use firmware_sim::host::SimulatedDevice;
-use firmware_sim::protocol::NewBlob;
+use firmware_sim::simulated::flash_file::FlashFile;
+use firmware_sim::simulated::host::SimulatedDevice;
+use ray_device::frame::checksum;
+use ray_device::protocol::NewBlob;
 use ray_runtime::{Aligned, RayBlob};
 
 const UPDATES: u32 = 10_000;

@@ -1,5 +1,6 @@
 //! The workstation's side: a device as something that can be asked.
 
+mod address;
 mod error;
 mod flash;
 #[cfg(feature = "serial")]
@@ -10,8 +11,8 @@ use std::collections::VecDeque;
 use std::io::ErrorKind;
 use std::time::{Duration, Instant};
 
-use crate::frame::{DELIMITER, FrameReader, FrameWriter, NO_SEQUENCE, Received, Rejected};
-use crate::protocol::{
+use ray_device::frame::{DELIMITER, FrameReader, FrameWriter, NO_SEQUENCE, Received, Rejected};
+use ray_device::protocol::{
     Hello, MAX_MATCHES, Match, Measured, Refusal, Reply, Request, SelfTestReport, Status,
     StoredBlob,
 };
@@ -28,7 +29,7 @@ pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(5);
 /// # Example
 /// ```
 /// use firmware_sim::client::DeviceClient;
-/// use firmware_sim::host::SimulatedDevice;
+/// use firmware_sim::simulated::host::SimulatedDevice;
 ///
 /// let device = SimulatedDevice::start("127.0.0.1:0".parse()?, &[])?;
 /// let mut client = DeviceClient::connect(&format!("tcp:{}", device.address()))?;
@@ -114,7 +115,7 @@ impl DeviceClient {
     pub fn reconnect(&mut self) -> Result<(), ClientError> {
         // The old one first: a serial port can be open only once.
         self.transport = None;
-        self.transport = Some(transport::open(&self.address, self.timeout)?);
+        self.transport = Some(address::open(&self.address, self.timeout)?);
         self.start_over()
     }
 

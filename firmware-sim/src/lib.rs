@@ -1,28 +1,5 @@
 #![doc = include_str!("../README.md")]
-#![cfg_attr(not(any(feature = "std", feature = "sim-flash")), no_std)]
 
-pub mod app;
-pub mod cobs;
-pub mod counting;
-pub mod frame;
-pub mod health;
-pub mod port;
-pub mod protocol;
-pub mod random;
-pub mod same_bits;
-pub mod session;
-pub mod storage;
-pub mod yardstick;
-
-#[cfg(feature = "std")]
+#[cfg(feature = "client")]
 pub mod client;
-#[cfg(feature = "std")]
-pub mod cost;
-#[cfg(feature = "std")]
-pub mod flash_file;
-#[cfg(feature = "std")]
-pub mod host;
-#[cfg(feature = "std")]
-pub mod qemu;
-#[cfg(feature = "sim-flash")]
-pub mod sim_flash;
+pub mod simulated;

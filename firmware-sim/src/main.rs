@@ -1,5 +1,7 @@
 //! The command line of the simulated device.
 
+mod cost;
+
 use std::io::Write;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
@@ -7,12 +9,12 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use clap::{Parser, Subcommand};
-use firmware_sim::cost;
-use firmware_sim::flash_file::{self, FlashFile};
-use firmware_sim::host::SimulatedDevice;
-use firmware_sim::protocol::{CameraStatus, MAX_CAMERAS_LISTED, MAX_NAME, Rig, name};
-use firmware_sim::qemu::{self, QemuDevice};
-use firmware_sim::storage::trust::{PublicKey, Trust};
+use cost::InQemu;
+use firmware_sim::simulated::flash_file::{self, FlashFile};
+use firmware_sim::simulated::host::SimulatedDevice;
+use firmware_sim::simulated::qemu::{self, QemuDevice};
+use ray_device::protocol::{CameraStatus, MAX_CAMERAS_LISTED, MAX_NAME, Rig, name};
+use ray_device::storage::trust::{PublicKey, Trust};
 
 /// A measuring device, simulated.
 ///
@@ -151,9 +153,9 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
             markdown,
         } => {
             let cost = if blobs.is_empty() {
-                cost::measure(&cost::built_in())?
+                firmware_cost::measure(&InQemu, &firmware_cost::built_in())?
             } else {
-                cost::measure(blobs)?
+                firmware_cost::measure(&InQemu, blobs)?
             };
             let text = if *json {
                 serde_json::to_string_pretty(&cost)? + "\n"
@@ -189,7 +191,7 @@ fn run_in_qemu(arguments: &DeviceArguments, image: Option<&Path>) -> anyhow::Res
     } else {
         eprintln!("firmware-sim: building the image, unless it is up to date");
         match &arguments.public_key {
-            Some(key) => qemu::build_signed_image("device_signed", &key.to_hex())?,
+            Some(key) => qemu::build_signed_image("device_signed", &key.to_string())?,
             None => qemu::build_image("device")?,
         }
     };

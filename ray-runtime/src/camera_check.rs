@@ -1,11 +1,11 @@
 //! What opening a blob checks of a camera: its record and its tables.
 
 use crate::OpenError;
-use crate::check::{check_padding, is_moderate, is_rotation, same_bits};
+use crate::check::{check_padding, is_rotation, same_bits};
 use crate::error::Table;
 use crate::format::{
     self, Axis, CameraMeta, Encoding, MAX_CELLS, MAX_DEGREE, QUANTIZED_HEADER_LEN, QuantizedHeader,
-    QuantizedMap, Record,
+    QuantizedMap, Record, is_moderate,
 };
 use crate::lookup::Views;
 

@@ -3,7 +3,7 @@
 use crate::OpenError;
 use crate::format::{
     self, ALIGNMENT, Axis, CameraMeta, HEADER_LEN, Header, MAGIC, MAX_CAMERAS, MAX_EXTENT_PX,
-    MAX_MAGNITUDE, Messages, OLDEST_VERSION, SelfTest, VERSION,
+    Messages, OLDEST_VERSION, SelfTest, VERSION,
 };
 use crate::uncertainty::Pair;
 
@@ -130,12 +130,6 @@ pub(crate) fn is_region_on_sensor(meta: &CameraMeta<'_>) -> bool {
     };
     fits(meta.region_u, meta.region_width, meta.sensor_width)
         && fits(meta.region_v, meta.region_height, meta.sensor_height)
-}
-
-/// Whether a number is finite and not larger than any length or ratio of a rig.
-pub(crate) fn is_moderate(x: f32) -> bool {
-    // NaN is in no range.
-    (-MAX_MAGNITUDE..=MAX_MAGNITUDE).contains(&x)
 }
 
 /// Whether the working numbers are the same to the last bit.

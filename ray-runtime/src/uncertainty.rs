@@ -7,8 +7,9 @@
 //! multiplications and additions in a fixed order: every target gives the same bits.
 
 use crate::PixelPoint;
-use crate::check::is_moderate;
-use crate::format::{self, MAX_MAGNITUDE, MAX_NODES, MAX_STEP_PX, NODE_LEN, PairHeader, TRIANGLE};
+use crate::format::{
+    self, MAX_MAGNITUDE, MAX_NODES, MAX_STEP_PX, NODE_LEN, PairHeader, TRIANGLE, is_moderate,
+};
 use crate::triangulate::Triangulation;
 use nalgebra::{Matrix3, Vector3};
 

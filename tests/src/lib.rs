@@ -21,7 +21,7 @@ use calib_simulate::{
     MatchSet, OpticsKind, OutputSettings, Scene, SceneSettings, TrueMatch, write_dataset,
 };
 use firmware_sim::client::DeviceClient;
-use firmware_sim::host::SimulatedDevice;
+use firmware_sim::simulated::host::SimulatedDevice;
 use nalgebra::Vector3;
 use std::path::{Path, PathBuf};
 

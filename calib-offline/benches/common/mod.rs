@@ -1,8 +1,8 @@
 //! What the tables of `BENCHMARKS.md` share: arguments, and draws in parallel.
 
-#[path = "../../tests/common/against_truth.rs"]
+#[path = "../../tests/it/common/against_truth.rs"]
 pub mod against_truth;
-#[path = "../../tests/common/halves.rs"]
+#[path = "../../tests/it/common/halves.rs"]
 pub mod halves;
 
 use calib_simulate::OpticsKind;

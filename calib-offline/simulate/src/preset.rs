@@ -10,12 +10,12 @@ use super::optics::{
 use super::random::{self, Purpose};
 use super::stage::{Mount, Placement};
 use calib_rays::geometry::{PixelPoint, RigidTransform, SensorSize, so3};
-use clap::ValueEnum;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 /// Kinds of optics; both cameras of a rig are of the same kind unless it says otherwise.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum OpticsKind {
     /// Pinhole with Brown-Conrady distortion.

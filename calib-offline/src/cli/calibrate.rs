@@ -1,9 +1,9 @@
 //! `calibrate`: a dataset to `calibration.json`, `rig.rays` and `report.html`.
 
 use super::Outcome;
+use super::error::Error;
 use super::output::Console;
 use super::place::check_results_folder;
-use crate::error::Error;
 use crate::methods::{self, Method};
 use crate::pipeline::{CalibrateError, CalibrateSettings, Calibrated};
 use crate::report::facts::Facts;
@@ -62,9 +62,6 @@ pub struct CalibrateArgs {
     /// Leave these poses out, besides those that the manifest leaves out
     #[arg(long, value_name = "POSE", value_delimiter = ',')]
     pub exclude: Vec<usize>,
-    /// Seed of everything drawn at random
-    #[arg(long, default_value_t = 1)]
-    pub seed: u64,
     /// Write one ray per pixel of each camera too: `rays_NAME.npy`
     #[arg(long)]
     pub ray_tables: bool,

@@ -1,8 +1,8 @@
 //! `compare`: for two calibrations, which it cannot do yet. Says where methods are compared.
 
 use super::Outcome;
+use super::error::Error;
 use super::usage_error::UsageError;
-use crate::error::Error;
 use clap::Args;
 use std::path::PathBuf;
 

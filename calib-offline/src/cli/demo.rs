@@ -2,13 +2,13 @@
 
 use super::Outcome;
 use super::calibrate::{FILES, Written, pack_settings, say_what_is_used, write_results};
+use super::error::Error;
 use super::output::Console;
 use super::usage_error::UsageError;
 use crate::demo::device::{check_cortex_m, check_simulated, corner_pairs, known_pairs};
 use crate::demo::page::{Entry, page};
 use crate::demo::unseen::measure_unseen;
 use crate::demo::{DemoError, DeviceCheck, Measured, words};
-use crate::error::Error;
 use crate::evaluate::Folds;
 use crate::evaluate::known_points::KnownPoints;
 use crate::pipeline::{self, CalibrateSettings, Checked};

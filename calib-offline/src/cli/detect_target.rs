@@ -2,7 +2,7 @@
 //! verdict on every image.
 
 use super::detect::DetectArgs;
-use crate::error::Error;
+use super::error::Error;
 use calib_rays::observed::View;
 use calib_rays::progress::Progress;
 use calib_recording::dataset::Dataset;

@@ -1,10 +1,10 @@
 //! `device`: how a device is, whether it computes what the packing host did, and back to the blob before.
 
 use super::Outcome;
+use super::error::Error;
 use super::output::Console;
 use super::usage_error::UsageError;
 use crate::device::{DeviceError, DeviceState, connect, state_in_words};
-use crate::error::Error;
 use calib_recording::dataset::identity::hex;
 use clap::{Args, Subcommand};
 use firmware_sim::client::DeviceClient;

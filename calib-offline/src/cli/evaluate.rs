@@ -1,6 +1,7 @@
 //! `evaluate`: the publication's experiments on a dataset, or on a simulated copy of its set-up.
 
 use super::Outcome;
+use super::error::Error;
 use super::output::Console;
 use crate::compare::publication::figures::figures;
 use crate::compare::publication::paper::evaluate_set_up;
@@ -9,7 +10,6 @@ use crate::compare::publication::words::{
     COMPARABLE, PUBLISHED_DEVIATION_MM, PUBLISHED_MEAN_MM, text,
 };
 use crate::compare::publication::{Evaluation, ExperimentSettings, evaluate};
-use crate::error::Error;
 use calib_recording::atomic_file::{check_folder, check_writable, make_folder, write_set};
 use calib_recording::dataset::Dataset;
 use clap::Args;

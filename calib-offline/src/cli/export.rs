@@ -1,11 +1,11 @@
 //! `export`: a blob in the form that a flash tool or a compiler takes.
 
 use super::Outcome;
+use super::error::Error;
 use super::output::Console;
 use super::place::check_file;
 use super::rig_file::{RigFile, open};
 use super::usage_error::UsageError;
-use crate::error::Error;
 use calib_blob::export::{self, ExportError, Form};
 use calib_recording::atomic_file;
 use clap::{Args, ValueEnum};

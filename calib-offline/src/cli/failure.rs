@@ -1,8 +1,8 @@
 //! How an error is told: what failed, why, and what to do about it.
 
+use super::error::Error;
 use super::output::{Console, Paint};
 use super::settings::{Narration, Settings};
-use crate::error::Error;
 use calib_rays::remedy::Remedy;
 use serde::Serialize;
 use std::error::Error as _;

@@ -1,17 +1,17 @@
 //! `flash`: a blob into the inactive slot of a device, checked there, and only then in use.
 
 use super::Outcome;
+use super::error::Error;
 use super::output::Console;
 use super::rig_file::{RigFile, open};
 use super::usage_error::UsageError;
 use crate::device::{DeviceError, connect};
-use crate::error::Error;
 use calib_blob::pack::BlobError;
 use calib_rays::progress::Progress;
 use calib_recording::dataset::identity::hex;
 use clap::Args;
 use firmware_sim::client::{FlashOptions, FlashProgress};
-use firmware_sim::protocol::Signature;
+use ray_device::protocol::Signature;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Duration;

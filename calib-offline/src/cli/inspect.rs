@@ -1,11 +1,11 @@
 //! `inspect`: what a dataset, a calibration or a blob is.
 
 use super::Outcome;
+use super::error::Error;
 use super::output::Console;
 use super::pack::form_name;
 use super::rig_file::{RigFile, open};
 use super::usage_error::UsageError;
-use crate::error::Error;
 use crate::report::facts::Facts;
 use crate::report::text::{short, summary};
 use calib_recording::capture::Capture;

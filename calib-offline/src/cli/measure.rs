@@ -2,12 +2,12 @@
 //! device.
 
 use super::Outcome;
+use super::error::Error;
 use super::output::Console;
 use super::place::check_file;
 use super::rig_file::{RigFile, open};
 use super::usage_error::UsageError;
 use crate::device::{DeviceSource, connect};
-use crate::error::Error;
 use crate::report::text::short;
 use calib_blob::matches::{
     BlobSource, MatchesError, MeasureSummary, POINTS_HEADER, StreamError, measure_batches,

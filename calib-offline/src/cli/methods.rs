@@ -2,10 +2,10 @@
 
 use super::Outcome;
 use super::calibrate::say_what_is_used;
+use super::error::Error;
 use super::output::Console;
 use super::place::check_results_folder;
 use crate::compare::{Comparison, compare, words};
-use crate::error::Error;
 use crate::pipeline;
 use calib_recording::atomic_file::{make_folder, write_set};
 use calib_recording::dataset::Dataset;

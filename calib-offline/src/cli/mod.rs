@@ -10,6 +10,7 @@ pub mod demo;
 pub mod detect;
 pub mod detect_target;
 pub mod device;
+pub mod error;
 pub mod evaluate;
 pub mod export;
 mod failure;
@@ -27,9 +28,9 @@ pub mod settings;
 pub mod simulate;
 pub mod usage_error;
 
-use crate::error::Error;
 use args::{Cli, Verb};
 use clap::Parser;
+use error::Error;
 use output::Console;
 use settings::Settings;
 use std::process::ExitCode;

@@ -2,9 +2,9 @@
 
 use super::Outcome;
 use super::calibrate::{BLOB_MAX_ERROR_PX, pack_settings};
+use super::error::Error;
 use super::output::Console;
 use super::place::check_file;
-use crate::error::Error;
 use crate::report::Calibration;
 use crate::report::text::short;
 use calib_blob::pack::{

@@ -4,8 +4,8 @@
 //! again from their inputs, so an earlier file of the same kind may be replaced by a new one; a
 //! calibration is not cheap, so its folder must not hold one.
 
+use super::error::Error;
 use super::usage_error::UsageError;
-use crate::error::Error;
 use calib_recording::atomic_file::{check_place, check_writable};
 use std::fs::File;
 use std::io::Read;

@@ -3,10 +3,10 @@
 use super::Outcome;
 use super::detect::{DetectArgs, DetectCommandError, run as run_detect};
 use super::detect_target::run as run_detect_target;
+use super::error::Error;
 use super::output::Console;
 use super::simulate::{SimulateArgs, SimulateSummary, run as run_simulate};
 use super::usage_error::UsageError;
-use crate::error::Error;
 use crate::report::text::short;
 use calib_recording::atomic_file::{check_folder, check_place};
 use calib_recording::dataset::{Dataset, SufficiencyError, write_corners};

@@ -1,7 +1,7 @@
 //! A rig from a file: a blob or a calibration, told apart by how the file begins.
 
+use super::error::Error;
 use super::usage_error::UsageError;
-use crate::error::Error;
 use crate::report::Calibration;
 use calib_blob::pack::{AlignedBytes, BlobError};
 use ray_runtime::RayBlob;

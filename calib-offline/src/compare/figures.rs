@@ -11,7 +11,6 @@ use calib_blob::matches::KnownMatches;
 use calib_estimate::adjust::Observations;
 use calib_estimate::reprojection::residuals;
 use calib_rays::geometry::RigidTransform;
-use calib_rays::measure::PointSource;
 use calib_rays::measure::RigSource;
 use calib_rays::numerics::rms;
 

@@ -1,6 +1,6 @@
 //! A device as the command line uses it: opened by its address, asked for points, and described.
 //!
-//! The messages and the connection are `firmware_sim`'s; what an answer means to a user is said here.
+//! The messages are `ray_device`'s, the connection is `firmware_sim`'s; what an answer means to a user is said here.
 
 mod points;
 mod state;
@@ -12,7 +12,7 @@ pub use words::state_in_words;
 
 use calib_rays::remedy::Remedy;
 use firmware_sim::client::{ClientError, DeviceClient};
-use firmware_sim::protocol::Refusal;
+use ray_device::protocol::Refusal;
 use std::time::Duration;
 
 /// Why a device did not do what it was asked for.

@@ -3,7 +3,7 @@
 use super::DeviceError;
 use calib_rays::measure::{Answers, BatchSource, Point, Sighting, Status};
 use firmware_sim::client::DeviceClient;
-use firmware_sim::protocol::{self, Match};
+use ray_device::protocol::{self, Match};
 use ray_runtime::{LookupError, MeasureError};
 
 /// A device that triangulates: the bits of the blob in its flash, measured there.

@@ -1,8 +1,8 @@
 //! What a device says of itself, as an object for JSON.
 
 use calib_recording::dataset::identity::hex;
-use firmware_sim::health::{GapReport, Verdict};
-use firmware_sim::protocol::{self, CameraStatus, Hello, Status};
+use ray_device::health::{GapReport, Verdict};
+use ray_device::protocol::{self, CameraStatus, Hello, Status};
 use serde::Serialize;
 
 /// The answer to `status`.

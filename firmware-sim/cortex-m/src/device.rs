@@ -1,8 +1,8 @@
-//! The application of `firmware-sim` behind the board's UART.
+//! The application of `ray-device` behind the board's UART.
 
-use firmware_sim::app::Device;
-use firmware_sim::session::Session;
-use firmware_sim::storage::trust::Trust;
+use ray_device::app::Device;
+use ray_device::session::Session;
+use ray_device::storage::trust::Trust;
 
 use crate::machine;
 use crate::ports::{Timer, Uart, flash_regions};

@@ -5,8 +5,8 @@ use core::convert::Infallible;
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_write,
 };
-use firmware_sim::port::{Clock, Link, MappedFlash, Regions};
-use firmware_sim::storage::Layout;
+use ray_device::port::{Clock, Link, MappedFlash, Regions, UNIT};
+use ray_device::storage::Layout;
 
 use crate::machine;
 
@@ -52,9 +52,6 @@ impl Link for Uart {
 
 /// Length of an erase block, bytes.
 const BLOCK: usize = 4096;
-
-/// Length of a program unit, bytes.
-const UNIT: usize = 8;
 
 /// The regions of the flash; `None` if they were handed out before.
 pub fn flash_regions() -> Option<Regions<FlashRegion>> {

@@ -6,7 +6,7 @@ use std::time::Duration;
 use ray_runtime::OpenError;
 use thiserror::Error;
 
-use crate::protocol::Refusal;
+use ray_device::protocol::Refusal;
 
 /// Why a device gave no answer, or not the one asked for.
 #[derive(Debug, Error)]

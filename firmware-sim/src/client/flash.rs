@@ -6,11 +6,12 @@ use std::time::Duration;
 use ray_runtime::{OpenError, RayBlob};
 
 use super::{ClientError, DeviceClient, unexpected};
-use crate::frame::checksum;
-use crate::protocol::{
-    CHUNK_UNIT, Chunk, MAX_CHUNK, NewBlob, Refusal, Reply, Request, Signature, StoredBlob, name,
+use ray_device::frame::checksum;
+use ray_device::port::UNIT;
+use ray_device::protocol::{
+    Chunk, MAX_CHUNK, NewBlob, Refusal, Reply, Request, Signature, StoredBlob, name,
 };
-use crate::storage::rig;
+use ray_device::storage::rig;
 
 /// How patiently a blob is sent.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -250,7 +251,7 @@ impl DeviceClient {
 
     fn chunk_length(&self) -> usize {
         let most = usize::from(self.greeting.max_chunk).min(MAX_CHUNK);
-        (most / CHUNK_UNIT * CHUNK_UNIT).max(CHUNK_UNIT)
+        (most / UNIT * UNIT).max(UNIT)
     }
 }
 

@@ -4,7 +4,7 @@ use std::fmt::{Debug, Formatter};
 use std::io::{ErrorKind, Read, Write};
 use std::time::Duration;
 
-use super::Transport;
+use super::transport::Transport;
 
 struct SerialLink(Box<dyn serialport::SerialPort>);
 

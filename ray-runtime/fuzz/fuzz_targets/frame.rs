@@ -8,13 +8,13 @@
 
 use std::sync::LazyLock;
 
-use firmware_sim::app::Device;
-use firmware_sim::frame::{DELIMITER, FrameReader, FrameWriter, Received, checksum};
-use firmware_sim::port::Clock;
-use firmware_sim::protocol::{Chunk, MAX_CHUNK, Match, NewBlob, Reply, Request, Sighting};
-use firmware_sim::session::Session;
-use firmware_sim::sim_flash::{BLOCK, SimFlash};
+use firmware_sim::simulated::sim_flash::{BLOCK, SimFlash};
 use libfuzzer_sys::fuzz_target;
+use ray_device::app::Device;
+use ray_device::frame::{DELIMITER, FrameReader, FrameWriter, Received, checksum};
+use ray_device::port::Clock;
+use ray_device::protocol::{Chunk, MAX_CHUNK, Match, NewBlob, Reply, Request, Sighting};
+use ray_device::session::Session;
 use ray_runtime::{Aligned, RayBlob};
 use serde::ser::{Serialize, SerializeTuple, Serializer};
 

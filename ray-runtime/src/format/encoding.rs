@@ -1,6 +1,6 @@
 //! The forms in which a camera's field can be stored.
 
-use super::OLDEST_VERSION;
+use super::header::OLDEST_VERSION;
 
 /// How a camera's table is stored. Every form gives, for a pixel, the half-angle vector of its ray
 /// and, if the camera is not central, the scaled offset.

@@ -2,7 +2,7 @@
 //! field by `postcard`, but the structs and enums by hand, for which its general way takes 2 KB more of a
 //! device's flash. The tests compare both.
 
-use super::{CameraMeta, LengthUnit, Meta, PixelConvention, SelfTest};
+use super::meta::{CameraMeta, LengthUnit, Meta, PixelConvention, SelfTest};
 use serde::Deserialize;
 
 /// Messages one behind the other. `None` of a message that is cut short or says what has no meaning;

@@ -1,6 +1,7 @@
 //! The header of a table of [`Form::Quantized`](super::Form::Quantized), and where its parts lie.
 
-use super::{aligned, coefficient_count};
+use super::encoding::coefficient_count;
+use super::header::aligned;
 
 /// Bytes of a [`QuantizedHeader`].
 pub const QUANTIZED_HEADER_LEN: usize = 8 * QUANTIZED_HEADER_PAIRS;

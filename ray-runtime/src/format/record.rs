@@ -1,6 +1,7 @@
 //! What a lookup needs of a camera, at fixed places.
 
-use super::Axis;
+use super::axis::Axis;
+use super::header::MAX_MAGNITUDE;
 
 /// Words of 4 bytes in a camera's record.
 pub const RECORD_WORDS: usize = 32;
@@ -134,6 +135,12 @@ impl Record<'_> {
             f32::from_bits(w[31]),
         ]
     }
+}
+
+/// Whether a number is finite and not larger than any length or ratio of a rig.
+pub(crate) fn is_moderate(x: f32) -> bool {
+    // NaN is in no range.
+    (-MAX_MAGNITUDE..=MAX_MAGNITUDE).contains(&x)
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! Covariance of what a model predicts: where cameras see points, given what they were fitted to.
+//! Posterior covariance of what a model predicts: where cameras see points, given what they were
+//! fitted to (METHOD 5).
 
 use super::assembly::Components;
 use super::model::{Layout, Model};

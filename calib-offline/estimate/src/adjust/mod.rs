@@ -1,6 +1,6 @@
-//! Adjustment: ray fields, poses, extrinsics and board shape moved together until the residuals
-//! are smallest. Initialization uses it on a few boards of one camera, the joint estimate on
-//! everything.
+//! Bundle adjustment: ray fields, poses, extrinsics and board shape moved together until the
+//! residuals are smallest. Initialization uses it on a few boards of one camera, the joint estimate
+//! on everything. METHOD 2.1 to 2.5.
 
 mod assembly;
 pub mod covariance;

@@ -5,7 +5,8 @@
 //! the knots of each camera's spline. A pose is coupled to another pose only through the other
 //! kinds, so without splines poses are eliminated first and the work is linear in their number.
 //! With splines these are eliminated first: each is banded and coupled to everything else (the
-//! border), METHOD 2.5. Nothing is ever formed that couples knots densely.
+//! border). What is left either way is a Schur complement; METHOD 2.5 has a picture of both orders.
+//! Nothing is ever formed that couples knots densely.
 
 use super::assembly::{self, Components, EXTRINSICS, ViewSums};
 use super::model::{CameraModel, Layout, Model, Step};

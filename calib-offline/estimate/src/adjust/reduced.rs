@@ -1,4 +1,5 @@
-//! The factorized normal equations: what the data leave open, without the inverse.
+//! The factorized normal equations, a Schur complement and what was eliminated before it: what the
+//! data leave open, without the inverse.
 
 use super::spline_block::EliminatedSpline;
 use calib_rays::numerics::cholesky::BandedCholesky;

@@ -3,8 +3,7 @@
 //! The corner's position P in the camera frame is seen in the axes of the ray that the field gives
 //! to the observed pixel: `Y = R(s)^T P`, `e = Y_12 - m`, the offset of the corner from the ray in
 //! mm. With `J = de/dx`, mm per px, the observed pixel minus the one that would have seen the
-//! corner is `A e`, `A = J^-1`, to first order (METHOD 2.2, with the half-angle vector s in place
-//! of w and the sign turned to "observed minus predicted").
+//! corner is `A e`, `A = J^-1`, to first order (METHOD 2.2).
 
 use calib_rays::field::{FieldSample, transport};
 use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};

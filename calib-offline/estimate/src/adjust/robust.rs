@@ -1,4 +1,5 @@
-//! How much a residual counts: weights of a bivariate Student-t distribution (METHOD 9A).
+//! How much a residual counts: weights of a bivariate Student-t distribution, found anew between
+//! steps (iteratively reweighted least squares; METHOD 2.6, 9A).
 //!
 //! Real corners have heavier tails than a Gaussian; simulated ones do not. The number of degrees
 //! of freedom comes from the residuals' own likelihood, so that Gaussian noise costs nothing.

@@ -1,9 +1,9 @@
 //! The equations of one camera's spline, and what is left of them once it is eliminated.
 //!
 //! The spline's knots meet each other in a band F and everything else in a border E, METHOD 2.5:
-//! `F = L L^T`, `Y = L^-1 E`, and `Y^T Y` is what the spline takes off the rest. The border stays
-//! in the fields' own columns (see [`Components`]) and the poses'; only the product is carried
-//! over to parameters.
+//! `F = L L^T`, `Y = L^-1 E`, and `Y^T Y` is what the spline takes off the rest: the rest less that
+//! is its Schur complement. The border stays in the fields' own columns (see [`Components`]) and the
+//! poses'; only the product is carried over to parameters.
 //!
 //! [`Components`]: super::assembly::Components
 

@@ -7,7 +7,7 @@
 //! discrepancy d of the poses and their information N. For good pairs and perfect fields it is
 //! the corner variance times a chi-square variable of 6 degrees of freedom; what fields lack at this
 //! stage comes on top and is alike for all pairs. So the scale is that of the middle pair, and up
-//! to half of all pairs may be wrong.
+//! to half of all pairs may be wrong (least median of squares, a relative of RANSAC; METHOD section 3).
 
 use super::view_fit::ViewFit;
 use calib_rays::board::BoardSpec;

@@ -1,5 +1,5 @@
-//! One view seen through a given field: where its board is, how well that is known, and how far
-//! its corners are from it. The basis for judging views and pairs of views.
+//! One view seen through a given field (resection): where its board is, how well that is known, and
+//! how far its corners are from it. The basis for judging views and pairs of views.
 
 use super::bearing_pose::bearing_pose;
 use crate::adjust::observations::ViewBlock;

@@ -14,7 +14,7 @@ use calib_rays::field::polynomial::term_count;
 use calib_rays::field::structured::StructuredBasis;
 use nalgebra::Vector2;
 
-/// Total degree of the field's polynomial (METHOD 9A).
+/// Total degree of the field's polynomial (METHOD 2.1, 9A).
 const DEGREE: usize = 7;
 /// Adjustments with structured directions only, so many and each to such a precision: what they
 /// leave is far below what the rounds after them change.

@@ -1,4 +1,5 @@
-//! How strongly smoothness holds, from the data themselves (METHOD 2.4, 9A).
+//! How strongly smoothness holds, from the data themselves: hyperparameters by the evidence, which is
+//! the marginal likelihood of the data (METHOD 2.4, 9A).
 
 use crate::adjust::knots::{thin_plate, thin_plate_ln_determinant};
 use crate::adjust::model::Layout;

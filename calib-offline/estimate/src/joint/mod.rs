@@ -1,4 +1,4 @@
-//! The default estimate: ray fields of all cameras, poses, extrinsics and board shape in one
+//! The default estimate: ray fields of all cameras, poses, extrinsics and board shape in one bundle
 //! adjustment, with smoothness weights and noise found from the data. METHOD sections 2 and 9A.
 
 pub mod calibrated;

@@ -1,4 +1,4 @@
-//! Base lenses fitted anew to what the fields have found, and the frames turned with them.
+//! Base lenses fitted anew to what the fields have found, and the frames turned with them (METHOD 2.1).
 
 use crate::adjust::{Model, Observations};
 use calib_rays::field::SmoothMap;

@@ -9,9 +9,9 @@
 //!   its first view: two equations, or for a board that faces the camera none.
 //! * A board that turns about one axis parallel to itself, as on a stage, determines everything from
 //!   three angles on: the circular points of its planes wander along the absolute conic, and five
-//!   points fix a conic. METHOD section 3 calls this motion nearly critical; for this closed form it
-//!   is not. From -40 to 40 degrees it amplifies noise by 1.1 to 1.2 against tilts both ways of the
-//!   same size, and only tilts within 4 degrees make that 1.7 (a test below).
+//!   points fix a conic. It was believed to be nearly critical (METHOD section 3) and is not: from
+//!   -40 to 40 degrees it amplifies noise by 1.1 to 1.2 against tilts both ways of the same size, and
+//!   only tilts within 4 degrees make that 1.7 (a test below).
 //! * What does harm is small tilts of either kind (noise grows with the inverse square), and
 //!   distortion, which the closed form takes for perspective.
 

@@ -1,7 +1,7 @@
 //! The polynomial directions a lens is expected to use, and the rest by degree.
 //!
 //! A free polynomial of degree 7 has 72 coefficients; few views cannot hold them all. So its space
-//! is split (METHOD 9A): a *structured* span that every lens may use freely (affine map, three
+//! is split (METHOD 2.1, 9A): a *structured* span that every lens may use freely (affine map, three
 //! radial terms, decentering, tilt of the sensor, shift of the distortion's center), and for each
 //! degree the remaining directions, which a smoothness weight holds back as far as the evidence
 //! asks for it. All directions are orthonormal over the sensor, so a coefficient is the RMS

@@ -1,7 +1,8 @@
 //! A direction from two numbers, and the two axes across it.
 //!
 //! The two numbers are the half-angle vector `s = 2 tan(theta/2) * (cos phi, sin phi)` of the
-//! direction at angle `theta` from the camera's z axis and azimuth `phi`. For narrow lenses it is
+//! direction at angle `theta` from the camera's z axis and azimuth `phi`: the inverse stereographic
+//! projection of the plane onto the sphere (METHOD 2.1). For narrow lenses it is
 //! the normalized image coordinate to first order; 90 degrees off axis is `|s| = 2`; it is smooth
 //! for every direction but straight backwards, so one code path serves narrow lenses and
 //! fisheyes. The rotation that carries the z axis to the direction along the great circle is that

@@ -7,7 +7,7 @@
 use crate::dataset::image::GrayImage;
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::PixelPoint;
-use calib_targets::chessboard::{
+use calib_targets_chessboard::{
     ChessboardDetector as TopologicalGrid, ChessboardParams, GrayImageView, default_chess_config,
     detect_corners,
 };

@@ -22,7 +22,6 @@ pub struct ImageVerdict {
 
 /// What became of an image.
 #[derive(Debug)]
-#[non_exhaustive]
 pub enum Outcome {
     /// Its corners are used.
     Used {

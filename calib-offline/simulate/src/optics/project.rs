@@ -2,8 +2,7 @@
 //!
 //! One search serves every kind of optics, so a new kind needs only its rays.
 
-use super::CameraOptics;
-use calib_rays::geometry::{PixelPoint, Ray};
+use calib_rays::geometry::{PixelPoint, Ray, SensorSize};
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 /// Cells of the start lattice along the sensor's width and height.
@@ -12,8 +11,17 @@ const LATTICE: (u32, u32) = (32, 24);
 /// steps are quadratic; 1e-11 px is about the round-off of a ray at half a meter.
 const STEP_PX: f64 = 2e-11;
 
+/// A sensor whose pixels have rays.
+pub(super) trait Rays {
+    /// Size of the sensor.
+    fn sensor(&self) -> SensorSize;
+
+    /// See [`super::CameraOptics::ray`].
+    fn ray(&self, pixel: PixelPoint) -> Option<Ray>;
+}
+
 /// Rays of a lattice over the sensor, its edges included; pixels without a ray are left out.
-pub(super) fn start_lattice(camera: &CameraOptics) -> Vec<(PixelPoint, Ray)> {
+pub(super) fn start_lattice(camera: &impl Rays) -> Vec<(PixelPoint, Ray)> {
     let sensor = camera.sensor();
     let (nu, nv) = LATTICE;
     let mut lattice = Vec::new();
@@ -33,7 +41,7 @@ pub(super) fn start_lattice(camera: &CameraOptics) -> Vec<(PixelPoint, Ray)> {
 
 /// Solves `ray(pixel)` through `point`; `None` if the search leaves the optics' domain.
 pub(super) fn solve(
-    camera: &CameraOptics,
+    camera: &impl Rays,
     lattice: &[(PixelPoint, Ray)],
     point: &Vector3<f64>,
 ) -> Option<PixelPoint> {
@@ -69,7 +77,7 @@ pub(super) fn solve(
 
 /// Takes the step, halved as long as it leaves the domain or makes things worse.
 fn accept(
-    camera: &CameraOptics,
+    camera: &impl Rays,
     miss: &Miss,
     from: PixelPoint,
     step: Vector2<f64>,
@@ -148,7 +156,7 @@ impl Miss {
 
     /// Derivative by the pixel, mm per px, by central differences (its error only slows the
     /// search, it does not move the solution).
-    fn jacobian(&self, camera: &CameraOptics, at: PixelPoint) -> Option<Matrix2<f64>> {
+    fn jacobian(&self, camera: &impl Rays, at: PixelPoint) -> Option<Matrix2<f64>> {
         const H_PX: f64 = 0.01;
         let column = |du: f64, dv: f64| {
             let sample = |sign: f64| {

@@ -2,6 +2,8 @@
 
 use super::*;
 use crate::preset::{OpticsKind, rig};
+use calib_rays::geometry::{PixelPoint, Ray, SensorSize};
+use nalgebra::Vector3;
 
 const SENSOR: SensorSize = SensorSize::new(1280, 1024);
 

@@ -34,7 +34,6 @@ fn args(folder: &Path) -> CalibrateArgs {
         output: folder.join("deep/results"),
         method: MethodArg::Joint,
         exclude: vec![3, 17],
-        seed: 1,
         ray_tables: false,
         force: false,
     }

@@ -11,7 +11,7 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hio;
 use firmware_cortex_m::machine;
-use firmware_sim::counting::{Job, Probe, Record, job_start};
+use firmware_cost::counting::{Job, Probe, Record, job_start};
 use ray_runtime::{PixelPoint, RayBlob, format, triangulate_pair};
 
 /// What a probe works on.

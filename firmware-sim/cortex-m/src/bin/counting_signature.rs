@@ -11,8 +11,8 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hio;
 use firmware_cortex_m::machine;
-use firmware_sim::protocol::Signature;
-use firmware_sim::storage::trust::PublicKey;
+use ray_device::protocol::Signature;
+use ray_device::storage::trust::PublicKey;
 
 /// A key and a signature of RFC 8032, section 7.1, third test.
 const KEY: &str = "fc51cd8e6218a1a38da47ed00230f0580816ed13ba3303ac5deb911548908025";

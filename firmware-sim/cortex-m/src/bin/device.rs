@@ -5,7 +5,7 @@
 
 use cortex_m_rt::entry;
 use firmware_cortex_m::{device, machine};
-use firmware_sim::storage::trust::Trust;
+use ray_device::storage::trust::Trust;
 
 #[entry]
 fn main() -> ! {

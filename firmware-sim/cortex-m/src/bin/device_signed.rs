@@ -11,7 +11,7 @@
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::entry;
 use firmware_cortex_m::device;
-use firmware_sim::storage::trust::{PublicKey, Trust};
+use ray_device::storage::trust::{PublicKey, Trust};
 
 const KEY: PublicKey = match PublicKey::from_hex(env!("RAYS_PUBLIC_KEY")) {
     Some(key) => key,

@@ -1,58 +1,14 @@
 //! The least that measures: opens the blob in the flash, looks rays up, triangulates. For the size of
 //! the runtime in an image, as `firmware-sim cost` reports it; it does nothing else.
-//!
-//! What the compiler inlines into the three functions below is the runtime's.
 
 #![no_std]
 #![no_main]
 
-use core::hint::black_box;
+mod footprint;
 
 use cortex_m_rt::entry;
-use firmware_cortex_m::machine;
-use ray_runtime::{LookupError, MeasureError, OpenError, PixelPoint, Ray, RayBlob, Triangulation};
-
-type Sighting = (usize, PixelPoint);
 
 #[entry]
 fn main() -> ! {
-    let flash = machine::flash();
-    loop {
-        let opened = open(black_box(flash));
-        let Ok(blob) = black_box(&opened) else {
-            continue;
-        };
-        let [a, b] = black_box([
-            (0, PixelPoint::new(0.0, 0.0)),
-            (1, PixelPoint::new(0.0, 0.0)),
-        ]);
-        black_box(&lookup(blob, a));
-        black_box(&triangulate(blob, a, b));
-    }
-}
-
-#[inline(never)]
-fn open(flash: &[u8]) -> Result<RayBlob<'_>, OpenError> {
-    let length = RayBlob::stated_len(flash)? as usize;
-    RayBlob::open(flash.get(..length).unwrap_or(flash))
-}
-
-#[inline(never)]
-fn lookup(blob: &RayBlob<'_>, (camera, pixel): Sighting) -> Result<Ray, LookupError> {
-    blob.lookup(camera, pixel)
-}
-
-#[inline(never)]
-fn triangulate(
-    blob: &RayBlob<'_>,
-    a: Sighting,
-    b: Sighting,
-) -> Result<Triangulation, MeasureError> {
-    blob.triangulate(a, b)
-}
-
-/// No panic is reachable in this image: if one were, it would not have linked.
-#[panic_handler]
-fn panic(_: &core::panic::PanicInfo) -> ! {
-    machine::refuse_to_link()
+    footprint::run(|_, _, _| ())
 }

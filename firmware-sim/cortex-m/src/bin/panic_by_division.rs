@@ -1,5 +1,5 @@
 //! An image that must not link: a division by a number that the compiler cannot prove to be other
-//! than zero has slipped in. `firmware-sim/tests/cost.rs` builds it and expects the linker's refusal.
+//! than zero has slipped in. `firmware-sim/tests/it/cost.rs` builds it and expects the linker's refusal.
 
 #![no_std]
 #![no_main]

@@ -1,5 +1,5 @@
 //! An image that must not link: an index that the compiler cannot prove to be in range has slipped
-//! in. `firmware-sim/tests/cost.rs` builds it and expects the linker's refusal.
+//! in. `firmware-sim/tests/it/cost.rs` builds it and expects the linker's refusal.
 
 #![no_std]
 #![no_main]

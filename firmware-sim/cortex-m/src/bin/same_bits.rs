@@ -6,7 +6,7 @@
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
 use firmware_cortex_m::machine;
-use firmware_sim::same_bits::digest;
+use firmware_cost::same_bits::digest;
 use ray_runtime::RayBlob;
 
 /// As many as the host compares.

@@ -78,7 +78,7 @@ fn predicted_sigma_is_the_scatter_of_the_corners() {
 
 #[test]
 fn real_images_are_found_whole() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/opencv-stereo/images");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/opencv-stereo/images");
     let images = |name: &str| {
         (1..=14)
             .map(|k| folder.join(format!("{name}{k:02}.jpg")))

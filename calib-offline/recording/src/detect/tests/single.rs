@@ -14,7 +14,7 @@ fn refusal(board: BoardSpec, photo: Photo) -> Refusal {
     assert!(found.views.is_empty());
     match found.images.into_iter().next().unwrap().outcome {
         Outcome::Refused(refusal) => refusal,
-        used => panic!("not refused: {used:?}"),
+        used @ Outcome::Used { .. } => panic!("not refused: {used:?}"),
     }
 }
 

@@ -1,0 +1,53 @@
+//! Own corners: views from any detector, in memory, without a file.
+//!
+//! ```sh
+//! cargo run --release -p calib-offline --example 02_own_corners
+//! ```
+
+use calib_estimate::adjust::Observations;
+use calib_estimate::init::rig::start_rig;
+use calib_estimate::joint::estimate_screened;
+use calib_rays::geometry::PixelPoint;
+use calib_rays::observed::{Corner, View};
+use calib_simulate::{OpticsKind, Scene, SceneSettings};
+use std::error::Error;
+
+pub(crate) fn main() -> Result<(), Box<dyn Error>> {
+    // In place of a detector: a simulated stage seen by two cameras, 0.05 px of noise.
+    let scene = Scene::new(SceneSettings::standard_noisy(OpticsKind::Brown, 1))?;
+    let board = scene.settings.board;
+    let sensors = vec![scene.cameras[0].sensor(), scene.cameras[1].sensor()];
+    let views: Vec<View> = scene.observe_corners().iter().map(your_view).collect();
+
+    // Where to start, and views that cannot be what they claim; then everything together.
+    let observations = Observations::new(board, sensors, &views);
+    let start = start_rig(&observations)?;
+    let (estimate, findings) = estimate_screened(&observations, start)?;
+    let rig = estimate.rig(&["left".to_owned(), "right".to_owned()]);
+    println!("{} views found wanting", findings.len());
+
+    // A point, mm, in the frame of the board at the first pose.
+    let corner = |view: &View| view.corners[0].pixel;
+    let (left, right) = (&views[0], views.iter().find(|view| view.camera_idx == 1));
+    let right = right.ok_or("the right camera sees no board")?;
+    let found = rig.triangulate(&[(0, corner(left)), (1, corner(right))])?;
+    println!("first corner of the first pose: {:.3?} mm", found.point_mm);
+    Ok(())
+}
+
+/// Camera and pose count from 0, rows and columns along the board's inner corners; pixel (0, 0) is the center of
+/// the top-left one.
+fn your_view(seen: &View) -> View {
+    let corners = seen.corners.iter().map(|corner| Corner {
+        row: corner.row,
+        col: corner.col,
+        pixel: PixelPoint::new(corner.pixel.u, corner.pixel.v),
+        // The detector's own standard deviation, px, where it has one.
+        sigma_px: None,
+    });
+    View {
+        camera_idx: seen.camera_idx,
+        pose: seen.pose,
+        corners: corners.collect(),
+    }
+}

@@ -1,0 +1,20 @@
+//! Tests of the library and the program from outside, in one program.
+
+mod alternating;
+mod bad_images;
+mod bad_input;
+mod bad_views;
+mod commands;
+mod common;
+mod cross_checks;
+mod data_files;
+mod device_commands;
+mod examples;
+mod experiments;
+mod export_command;
+mod joint_estimate;
+mod methods;
+mod point_sigma;
+mod starting_points;
+mod target_command;
+mod uncertainty;

@@ -1,0 +1,44 @@
+//! What counting needs of whoever builds images and runs them.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+/// Why there is no image, or why it did not run.
+pub type ImagesError = Box<dyn Error + Send + Sync>;
+
+/// Builds the images of `cortex-m` and runs them in QEMU.
+pub trait Images {
+    /// What QEMU says of its version.
+    ///
+    /// # Errors
+    /// If it is not installed.
+    fn qemu_version(&self) -> Result<String, ImagesError>;
+
+    /// Builds the images of these names if they are missing or stale.
+    ///
+    /// # Errors
+    /// If that fails, or there is nothing to build them with.
+    fn build(&self, names: &[&str]) -> Result<(), ImagesError>;
+
+    /// Where the image of this name is once it has been built.
+    fn path(&self, name: &str) -> PathBuf;
+
+    /// Builds the image of this name without what reads blobs of old versions, and returns where it is.
+    ///
+    /// # Errors
+    /// As [`Images::build`].
+    fn build_newest_only(&self, name: &str) -> Result<PathBuf, ImagesError>;
+
+    /// Runs an image to its end on a flash that starts with this file; every instruction takes
+    /// 2^`time_shift` ns of its time, and nothing else takes any.
+    ///
+    /// # Errors
+    /// If it cannot be run.
+    fn run_counting(
+        &self,
+        image: &Path,
+        flash: &Path,
+        time_shift: u32,
+    ) -> Result<Output, ImagesError>;
+}

@@ -1,0 +1,127 @@
+//! What the runtime costs on a Cortex-M4F: instructions and stack from QEMU, code from the images.
+//!
+//! The image `counting` runs every piece of work between two looks at a timer. QEMU gives each
+//! instruction the same time and everything else none, so the timer counts instructions: exactly,
+//! and the same in every run. What the two looks and an empty call take is subtracted; a block of a
+//! hundred instructions must then count a hundred, or nothing is reported.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use crate::blobs::Asked;
+use crate::count::{COUNTING, cost_of_blob};
+use crate::counting::KNOWN_INSTRUCTIONS;
+use crate::error::CostError;
+use crate::image::{Image, RESET, STARTUP};
+use crate::images::Images;
+use crate::report::{Conditions, Cost, ImageCost, SCHEMA};
+
+/// The images whose size is reported, what each does, and the functions of each whose stack is.
+const IMAGES: [(&str, &str, &[&str]); 3] = [
+    (
+        "footprint_measure",
+        "open, lookup, triangulate",
+        &["open", "lookup", "triangulate"],
+    ),
+    (
+        "footprint_covariance",
+        "the same and triangulate_with_covariance",
+        &[
+            "open",
+            "lookup",
+            "triangulate",
+            "triangulate_with_covariance",
+        ],
+    ),
+    ("device", "the device application", &[RESET]),
+];
+
+/// Counts the given blobs; the images are built first when they are missing or stale.
+///
+/// # Errors
+/// [`CostError`].
+pub fn measure(images: &impl Images, paths: &[PathBuf]) -> Result<Cost, CostError> {
+    let qemu = images.qemu_version()?;
+    let asked = paths
+        .iter()
+        .map(|path| Asked::read(path))
+        .collect::<Result<Vec<_>, _>>()?;
+    let mut names = vec![COUNTING];
+    names.extend(IMAGES.map(|(name, ..)| name));
+    images.build(&names)?;
+
+    let counting = Image::read(&images.path(COUNTING))?;
+    let mut conditions = Conditions {
+        target: "thumbv7em-none-eabihf",
+        machine: "mps2-an386, cortex-m4",
+        qemu,
+        compiler: counting.compiler.clone().unwrap_or_default(),
+        profile: "opt-level 3, fat LTO, one codegen unit, panic = abort",
+        known_block: KNOWN_INSTRUCTIONS,
+        known_block_counted: 0,
+        overhead: 0,
+    };
+    let mut blobs = Vec::new();
+    for (path, asked) in paths.iter().zip(&asked) {
+        blobs.push(cost_of_blob(
+            images,
+            &counting,
+            path,
+            asked,
+            &mut conditions,
+        )?);
+    }
+    let newest_only = Image::read(&images.build_newest_only(IMAGES[0].0)?)?;
+    let costs = IMAGES
+        .iter()
+        .map(|(name, does, functions)| image_cost(&images.path(name), name, does, functions))
+        .collect::<Result<_, _>>()?;
+    Ok(Cost {
+        schema: SCHEMA,
+        conditions,
+        blobs,
+        images: costs,
+        newest_only_code_bytes: runtime_code_bytes(&newest_only.code_by_origin()),
+    })
+}
+
+/// The functions of an image that have to do with panics: none, if it links only without.
+///
+/// # Errors
+/// [`CostError::Io`], [`CostError::Elf`].
+pub fn panics_in(image: &Path) -> Result<Vec<String>, CostError> {
+    Ok(Image::read(image)?.panics())
+}
+
+/// Of an image that calls the runtime and does nothing else.
+fn runtime_code_bytes(code_by_origin: &BTreeMap<String, u64>) -> u64 {
+    let of_runtime = code_by_origin
+        .iter()
+        .filter(|(origin, _)| *origin != STARTUP);
+    of_runtime.map(|(_, bytes)| bytes).sum()
+}
+
+fn image_cost(
+    path: &Path,
+    name: &'static str,
+    does: &'static str,
+    functions: &[&'static str],
+) -> Result<ImageCost, CostError> {
+    let image = Image::read(path)?;
+    let code_by_origin = image.code_by_origin();
+    let calls_runtime_alone = functions != [RESET];
+    let runtime_code_bytes = runtime_code_bytes(&code_by_origin);
+    let bound = |function: &&'static str| (*function, image.stack_bound(name, function));
+    Ok(ImageCost {
+        image: name,
+        does,
+        ram_besides_stack: image.ram_besides_stack(),
+        runtime_code_bytes: calls_runtime_alone.then_some(runtime_code_bytes),
+        panics: image.panics(),
+        stack_bounds: functions.iter().map(bound).collect(),
+        code_by_origin,
+        sections: image.sections,
+        functions: image.functions,
+        statics: image.statics,
+    })
+}

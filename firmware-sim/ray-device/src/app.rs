@@ -1,0 +1,381 @@
+//! The device application: boots from its flash, then answers.
+//!
+//! It lives in epochs. During one, the active slot is only borrowed for reading, by the blob that is
+//! open in place, and the other slot is the one that can be written. When another blob becomes
+//! active, the epoch is over, and the next begins as after a restart:
+//!
+//! ```text
+//! let mut device = Device::new(kind, clock);
+//! loop {
+//!     let mut epoch = device.epoch(&mut regions);
+//!     session.serve(&mut link, &mut epoch)?;
+//! }
+//! ```
+
+mod self_test;
+
+use heapless::Vec;
+use ray_runtime::{MeasureError, OpenError, PixelPoint, RayBlob};
+
+use crate::health::Health;
+use crate::port::{Clock, MappedFlash, Regions};
+use crate::protocol::{
+    BlobStatus, CameraStatus, Chunk, Hello, MAX_CHUNK, MAX_MATCHES, Match, Measured, NewBlob,
+    Point, Refusal, Reply, Request, Rig, Sighting, SlotState, Status, StoredBlob, name,
+};
+use crate::session::Responder;
+use crate::storage::log::{Log, Record};
+use crate::storage::transfer::{Owner, Peer, Transfer};
+use crate::storage::trust::Trust;
+use crate::storage::{self, blob_bytes, blob_of, max_blob, rig};
+
+/// Version of the application, as [`Hello`] gives it.
+pub const FIRMWARE_VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// What of a device outlives its epochs.
+#[derive(Debug)]
+pub struct Device<C> {
+    kind: &'static str,
+    clock: C,
+    trust: Trust,
+    transfer: Option<Transfer>,
+    /// Of what this epoch's blob measured.
+    health: Health,
+    answered: u32,
+    refused: u32,
+    updates: u32,
+    rollbacks: u32,
+}
+
+impl<C: Clock> Device<C> {
+    /// A device of the given kind that has just been switched on.
+    pub fn new(kind: &'static str, clock: C) -> Self {
+        Self {
+            kind,
+            clock,
+            trust: Trust::Anybody,
+            transfer: None,
+            health: Health::new(),
+            answered: 0,
+            refused: 0,
+            updates: 0,
+            rollbacks: 0,
+        }
+    }
+
+    /// The same device, taking only blobs that this trust allows. What is in its slots stays there.
+    #[must_use]
+    pub fn taking(mut self, trust: Trust) -> Self {
+        self.trust = trust;
+        self
+    }
+
+    /// Decides which blob is active, checks all of it and opens it in place.
+    ///
+    /// Flash without a blob that can be used does not stop it: it answers, and says what is wrong.
+    #[inline(never)]
+    pub fn epoch<'e, R: MappedFlash>(&'e mut self, regions: &'e mut Regions<R>) -> Epoch<'e, R, C> {
+        self.health = Health::new();
+        let booted = storage::boot(regions);
+        let rig = rig::read(&regions.factory);
+        let [slot_0, slot_1] = &mut regions.slots;
+        let (active, inactive, inactive_index) = match (booted.active, booted.slots) {
+            (Some(0), _) => (Some(&*slot_0), slot_1, 1),
+            (Some(_), _) => (Some(&*slot_1), slot_0, 0),
+            // The one with less in it.
+            (None, [SlotState::Empty, _]) => (None, slot_0, 0),
+            (None, _) => (None, slot_1, 1),
+        };
+        let stored = booted.slots.into_iter().find_map(|state| match state {
+            SlotState::Holds(stored) if Some(usize::from(stored.slot)) == booted.active => {
+                Some(stored)
+            }
+            _ => None,
+        });
+        let blob = match (active, stored) {
+            (Some(region), Some(stored)) => blob_bytes(region, stored.length)
+                .and_then(storage::open)
+                .map_err(OpenError::code),
+            _ => Err(booted.open_error),
+        };
+        Epoch {
+            device: self,
+            blob,
+            rig,
+            active: stored,
+            slots: booted.slots,
+            inactive,
+            inactive_index,
+            next_sequence: booted.next_sequence,
+            is_over: false,
+        }
+    }
+}
+
+/// A device for as long as the same blob is active.
+#[derive(Debug)]
+pub struct Epoch<'e, R, C> {
+    device: &'e mut Device<C>,
+    blob: Result<RayBlob<'e>, u8>,
+    rig: Option<Rig>,
+    active: Option<StoredBlob>,
+    slots: [SlotState; 2],
+    inactive: &'e mut R,
+    inactive_index: usize,
+    next_sequence: Option<u32>,
+    is_over: bool,
+}
+
+impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
+    /// The answer to a request of this peer.
+    pub fn respond_to(&mut self, peer: Peer, request: &Request) -> Reply {
+        let reply = match request {
+            Request::Hello => Ok(Reply::Hello(self.hello())),
+            Request::Status => Ok(Reply::Status(self.status())),
+            Request::Measure(matches) => self.measure(matches),
+            Request::BeginUpdate(new) => self.begin_update(peer, new),
+            Request::Chunk(chunk) => self.store(peer, chunk),
+            Request::FinishUpdate => self.finish_update(peer),
+            Request::AbortUpdate => self.abort_update(peer),
+            Request::Rollback => self.rollback(peer),
+            Request::SelfTest => self.self_test(),
+        };
+        match reply {
+            Ok(reply) => {
+                self.device.answered = self.device.answered.saturating_add(1);
+                reply
+            }
+            Err(refusal) => {
+                self.note_refused(refusal);
+                Reply::Refused(self.counted_from_start_of_flash(refusal))
+            }
+        }
+    }
+
+    fn hello(&self) -> Hello {
+        Hello {
+            device: name(self.device.kind),
+            firmware: name(FIRMWARE_VERSION),
+            max_matches: MAX_MATCHES as u8,
+            max_chunk: MAX_CHUNK as u16,
+            max_blob: max_blob(self.inactive),
+            needs_signature: self.device.trust.needs_signature(),
+        }
+    }
+
+    #[inline(never)]
+    fn status(&mut self) -> Status {
+        let mut slots = self.slots;
+        let update = self.device.transfer.as_ref().map(Transfer::status);
+        if let (Some(_), Some(slot)) = (&update, slots.get_mut(self.inactive_index)) {
+            *slot = SlotState::Receiving;
+        }
+        Status {
+            uptime_ms: self.device.clock.uptime_ms(),
+            answered: self.device.answered,
+            refused: self.device.refused,
+            blob: self.blob.as_ref().map(blob_status).map_err(|code| *code),
+            active_slot: self.active.map(|stored| stored.slot),
+            slots,
+            update,
+            max_blob: max_blob(self.inactive),
+            updates: self.device.updates,
+            rollbacks: self.device.rollbacks,
+            rig: self.rig.clone(),
+            gaps: self.device.health.report(),
+        }
+    }
+
+    #[inline(never)]
+    fn measure(&mut self, matches: &[Match]) -> Result<Reply, Refusal> {
+        let blob = opened(&self.blob)?;
+        let health = &mut self.device.health;
+        let measured = matches.iter().map(|asked| measure_one(blob, asked, health));
+        Ok(Reply::Measured(bounded(measured)))
+    }
+
+    fn self_test(&self) -> Result<Reply, Refusal> {
+        Ok(Reply::SelfTested(self_test::report(opened(&self.blob)?)))
+    }
+
+    #[inline(never)]
+    fn begin_update(&mut self, peer: Peer, new: &NewBlob) -> Result<Reply, Refusal> {
+        let now_ms = self.device.clock.uptime_ms();
+        if let Some(transfer) = &mut self.device.transfer {
+            if transfer.is_of(new) {
+                let received = transfer.resume(peer, now_ms);
+                return Ok(Reply::Receiving { received });
+            }
+            transfer.make_way(peer, now_ms)?;
+        }
+        self.device.transfer = None;
+        if let Some(active) = self.active
+            && active.length == new.length
+            && active.checksum == new.checksum
+            && active.identity == new.identity
+        {
+            return Ok(Reply::Active(active));
+        }
+        let owner = Owner {
+            rig: self.rig.as_ref(),
+            trust: self.device.trust,
+        };
+        let begun = Transfer::begin(self.inactive, new, peer, &owner, now_ms);
+        if matches!(begun, Ok(_) | Err(Refusal::FlashFailed { .. }))
+            && let Some(slot) = self.slots.get_mut(self.inactive_index)
+        {
+            *slot = SlotState::Empty;
+        }
+        self.device.transfer = Some(begun?);
+        Ok(Reply::Receiving { received: 0 })
+    }
+
+    #[inline(never)]
+    fn store(&mut self, peer: Peer, chunk: &Chunk) -> Result<Reply, Refusal> {
+        let now_ms = self.device.clock.uptime_ms();
+        let transfer = self.device.transfer.as_mut().ok_or(Refusal::NoUpdate)?;
+        transfer.check_peer(peer)?;
+        let outcome = transfer.store(self.inactive, chunk, now_ms);
+        if let Err(Refusal::FlashFailed { .. }) = outcome {
+            // Part of it may be programmed, and cannot be once more: only a new start helps.
+            self.device.transfer = None;
+        }
+        Ok(Reply::Receiving { received: outcome? })
+    }
+
+    #[inline(never)]
+    fn finish_update(&mut self, peer: Peer) -> Result<Reply, Refusal> {
+        let transfer = self.device.transfer.as_ref().ok_or(Refusal::NoUpdate)?;
+        transfer.check_peer(peer)?;
+        let identity = transfer.status().identity;
+        let owner = Owner {
+            rig: self.rig.as_ref(),
+            trust: self.device.trust,
+        };
+        let outcome = transfer.check(self.inactive, &owner);
+        if let Err(refusal @ Refusal::Incomplete { .. }) = outcome {
+            return Err(refusal);
+        }
+        self.device.transfer = None;
+        let checked = outcome?;
+        let sequence = checked.commit(self.inactive, self.next_sequence)?;
+        self.device.updates = self.device.updates.saturating_add(1);
+        self.is_over = true;
+        Ok(Reply::Active(StoredBlob {
+            slot: self.inactive_index as u8,
+            sequence,
+            length: checked.length,
+            checksum: checked.checksum,
+            identity,
+        }))
+    }
+
+    fn abort_update(&mut self, peer: Peer) -> Result<Reply, Refusal> {
+        if let Some(transfer) = &self.device.transfer {
+            transfer.make_way(peer, self.device.clock.uptime_ms())?;
+        }
+        self.device.transfer = None;
+        Ok(Reply::Aborted)
+    }
+
+    #[inline(never)]
+    fn rollback(&mut self, peer: Peer) -> Result<Reply, Refusal> {
+        if let Some(transfer) = &self.device.transfer {
+            transfer.make_way(peer, self.device.clock.uptime_ms())?;
+        }
+        let Some(SlotState::Holds(stored)) = self.slots.get(self.inactive_index).copied() else {
+            return Err(Refusal::NothingToRollBackTo);
+        };
+        let sequence = self.next_sequence.ok_or(Refusal::LogFull)?;
+        let record = Record {
+            sequence,
+            length: stored.length,
+            checksum: stored.checksum,
+        };
+        // It was whole when the device started; bits may have flipped since.
+        let blob = blob_of(self.inactive, record).map_err(|_| Refusal::NothingToRollBackTo)?;
+        if let Some(own) = &self.rig {
+            rig::compare(&blob, own)?;
+        }
+        Log::commit(self.inactive, record)?;
+        self.device.rollbacks = self.device.rollbacks.saturating_add(1);
+        self.is_over = true;
+        Ok(Reply::Active(StoredBlob { sequence, ..stored }))
+    }
+
+    /// A refusal with its address as seen from outside of the slot.
+    fn counted_from_start_of_flash(&self, refusal: Refusal) -> Refusal {
+        let Refusal::FlashFailed { operation, address } = refusal else {
+            return refusal;
+        };
+        let slot_length = self.inactive.capacity() as u32;
+        let slot_start = (R::ERASE_SIZE as u32)
+            .saturating_add(slot_length.saturating_mul(self.inactive_index as u32));
+        Refusal::FlashFailed {
+            operation,
+            address: slot_start.saturating_add(address),
+        }
+    }
+}
+
+impl<R: MappedFlash, C: Clock> Responder for Epoch<'_, R, C> {
+    fn respond(&mut self, request: &Request) -> Reply {
+        self.respond_to(0, request)
+    }
+
+    fn note_refused(&mut self, _: Refusal) {
+        self.device.refused = self.device.refused.saturating_add(1);
+    }
+
+    fn is_over(&self) -> bool {
+        self.is_over
+    }
+}
+
+/// The blob, or why there is none.
+fn opened<'a, 'b>(blob: &'a Result<RayBlob<'b>, u8>) -> Result<&'a RayBlob<'b>, Refusal> {
+    blob.as_ref()
+        .map_err(|&open_error| Refusal::NoBlob { open_error })
+}
+
+/// As many of the items as fit. (`collect` would panic at one more, and the image may not.)
+fn bounded<T, const N: usize>(items: impl Iterator<Item = T>) -> Vec<T, N> {
+    let mut vec = Vec::new();
+    for item in items {
+        if vec.push(item).is_err() {
+            break;
+        }
+    }
+    vec
+}
+
+fn blob_status(blob: &RayBlob<'_>) -> BlobStatus {
+    let cameras = (0..blob.camera_count()).map_while(|index| blob.camera(index));
+    BlobStatus {
+        identity: *blob.identity(),
+        length: blob.len() as u32,
+        camera_count: blob.camera_count() as u8,
+        cameras: bounded(cameras.map(|camera| CameraStatus {
+            name: name(camera.name),
+            width_px: camera.sensor_width,
+            height_px: camera.sensor_height,
+        })),
+    }
+}
+
+fn measure_one(blob: &RayBlob<'_>, asked: &Match, health: &mut Health) -> Measured {
+    let pixel_of = |sighting: Sighting| {
+        (
+            usize::from(sighting.camera),
+            PixelPoint::new(sighting.u_px, sighting.v_px),
+        )
+    };
+    let outcome = blob.triangulate_with_covariance(pixel_of(asked.first), pixel_of(asked.second));
+    if let Ok(measured) = &outcome {
+        health.note(measured);
+    }
+    Measured {
+        id: asked.id,
+        outcome: outcome.map(Point::from).map_err(MeasureError::code),
+    }
+}

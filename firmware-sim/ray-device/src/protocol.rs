@@ -1,0 +1,368 @@
+//! The messages between a workstation and a device: defined once, here, and used by both.
+//!
+//! Messages are `postcard` encodings of [`Request`] and [`Reply`] inside the frames of
+//! [`crate::frame`]. `postcard` does not describe itself, so the order of variants and fields *is*
+//! the protocol: new variants go to the end, and any other change raises [`PROTOCOL_VERSION`]. The
+//! exact bytes are pinned by tests below. Every request has exactly one reply, which carries the
+//! request's sequence number; a sender may have several requests under way.
+//!
+//! Pixels have (0, 0) at the center of the top-left pixel; points are in the rig's frame, mm.
+
+mod refusal;
+
+use heapless::{String, Vec};
+use ray_runtime::Measurement;
+use serde::{Deserialize, Serialize};
+
+use crate::health::GapReport;
+
+pub use refusal::{FlashOperation, Refusal, RigPart};
+
+/// The protocol spoken here. It stands in every frame, and a device refuses any other.
+pub const PROTOCOL_VERSION: u8 = 3;
+
+/// Matches in one [`Request::Measure`]: with 28 both messages stay below 1 KiB.
+pub const MAX_MATCHES: usize = 28;
+
+/// Bytes of a blob in one [`Request::Chunk`]: a multiple of every program unit, below 1 KiB with its
+/// head.
+pub const MAX_CHUNK: usize = 896;
+
+/// Cameras listed in a [`Status`]; a blob may hold more, [`BlobStatus::camera_count`] says how
+/// many.
+pub const MAX_CAMERAS_LISTED: usize = 8;
+
+/// Longest name in a message, bytes. Longer ones are cut at a character.
+pub const MAX_NAME: usize = 32;
+
+/// Length of a blob's identity, bytes.
+pub const IDENTITY_LENGTH: usize = ray_runtime::format::IDENTITY_LEN;
+
+/// A name as it travels.
+pub type Name = String<MAX_NAME>;
+
+/// What a workstation asks.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+// There is no heap to box the large variant into, and one request exists at a time.
+#[allow(clippy::large_enum_variant)]
+pub enum Request {
+    /// Who is there? Answered by [`Reply::Hello`].
+    Hello,
+    /// How is the device? Answered by [`Reply::Status`].
+    Status,
+    /// Triangulate these. Answered by [`Reply::Measured`], entry by entry in the same order.
+    Measure(Vec<Match, MAX_MATCHES>),
+    /// A new blob is coming. Answered by [`Reply::Receiving`], or by [`Reply::Active`] if this very
+    /// blob is active already and nothing needs to be sent.
+    ///
+    /// If this very blob is under way, from whichever peer, its transfer goes on where it stopped:
+    /// the answer says how much has arrived. Any other transfer of the same peer is given up, and
+    /// that of another peer once it has been silent for a while.
+    BeginUpdate(NewBlob),
+    /// The next bytes of the new blob. Answered by [`Reply::Receiving`].
+    ///
+    /// Chunks come in order. A repeat of the last one is acknowledged again; any other place is
+    /// refused with the one expected.
+    Chunk(Chunk),
+    /// All bytes were sent: check the new blob and make it active. Answered by [`Reply::Active`].
+    FinishUpdate,
+    /// Give the transfer up. Answered by [`Reply::Aborted`], also if there is none.
+    AbortUpdate,
+    /// Make the other slot's blob active, after a check of all of it. Answered by [`Reply::Active`].
+    Rollback,
+    /// Compare the active blob's self-tests. Answered by [`Reply::SelfTested`].
+    SelfTest,
+}
+
+/// What a device answers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(clippy::large_enum_variant)]
+pub enum Reply {
+    /// The request could not be carried out. Which blob is active did not change.
+    Refused(Refusal),
+    /// Answer to [`Request::Hello`].
+    Hello(Hello),
+    /// Answer to [`Request::Status`].
+    Status(Status),
+    /// Answer to [`Request::Measure`].
+    Measured(Vec<Measured, MAX_MATCHES>),
+    /// A blob is under way: how many of its bytes have been stored.
+    Receiving {
+        /// From the first on; the next chunk starts here.
+        received: u32,
+    },
+    /// This blob is active, now and after any restart.
+    Active(StoredBlob),
+    /// Nothing is under way any more.
+    Aborted,
+    /// Answer to [`Request::SelfTest`].
+    SelfTested(SelfTestReport),
+}
+
+/// A blob to be sent.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct NewBlob {
+    /// Its length, bytes.
+    pub length: u32,
+    /// CRC-32/ISO-HDLC of all its bytes (zlib's): [`crate::frame::checksum`].
+    pub checksum: u32,
+    /// Its identity, which must be the one that it states itself.
+    pub identity: [u8; IDENTITY_LENGTH],
+    /// Serial number of the rig it was calibrated on, if known: a device that knows its own takes
+    /// no other.
+    pub rig_serial: Option<Name>,
+    /// Who made it, if anybody signed it: [`Hello::needs_signature`] says whether it must be.
+    pub signature: Option<Signature>,
+}
+
+/// An Ed25519 signature (RFC 8032) of all bytes of a blob.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Signature {
+    /// Its first half, a point.
+    pub r: [u8; 32],
+    /// Its second half, a number.
+    pub s: [u8; 32],
+}
+
+impl Signature {
+    /// From its 64 bytes.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let (r, s) = bytes.split_first_chunk()?;
+        Some(Self {
+            r: *r,
+            s: s.try_into().ok()?,
+        })
+    }
+}
+
+/// A piece of a blob on its way.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Chunk {
+    /// Where in the blob it starts.
+    pub offset: u32,
+    /// A multiple of [`UNIT`](crate::port::UNIT) bytes, unless it is the last: whole units are programmed
+    /// as chunks come.
+    pub bytes: Vec<u8, MAX_CHUNK>,
+}
+
+/// A blob in a slot, with a valid commit record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StoredBlob {
+    /// Which slot, 0 or 1.
+    pub slot: u8,
+    /// Of its commit record: the highest is the active one.
+    pub sequence: u32,
+    /// Its length, bytes.
+    pub length: u32,
+    /// CRC-32 of all its bytes.
+    pub checksum: u32,
+    /// Hash of the calibration it was packed from.
+    pub identity: [u8; IDENTITY_LENGTH],
+}
+
+/// What the self-tests of the active blob gave on this device.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SelfTestReport {
+    /// How many the blob holds.
+    pub tests: u16,
+    /// How many gave the very bits of the host that packed it.
+    pub equal: u16,
+    /// How many gave no answer at all where there should be one.
+    pub unanswered: u16,
+    /// Largest difference of a coordinate of a ray's origin, of a point or of a standard deviation,
+    /// mm.
+    pub worst_mm: f32,
+    /// Largest difference of a component of a ray's direction.
+    pub worst_direction: f32,
+}
+
+/// A point seen by two cameras.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Match {
+    /// The sender's own number, given back with the answer.
+    pub id: u32,
+    /// Where the first camera sees it.
+    pub first: Sighting,
+    /// Where the second camera sees it.
+    pub second: Sighting,
+}
+
+/// One camera's pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sighting {
+    /// Index of the camera in the blob.
+    pub camera: u8,
+    /// To the right, px.
+    pub u_px: f32,
+    /// Down, px.
+    pub v_px: f32,
+}
+
+/// The answer to one [`Match`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Measured {
+    /// The [`Match::id`] it answers.
+    pub id: u32,
+    /// The point, or the stable code of the runtime's `MeasureError` that says why there is none.
+    pub outcome: Result<Point, u8>,
+}
+
+/// A triangulated point.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Point {
+    /// x, y, z in the rig's frame, mm.
+    pub point_mm: [f32; 3],
+    /// Square of the length of the common perpendicular, mm². The device takes no square root of it.
+    pub gap_squared_mm2: f32,
+    /// Predicted standard deviation along x, y and z of the rig's frame, mm: what the calibration
+    /// leaves uncertain, and pixel noise of the size of its corners'. `None` where the blob does
+    /// not say.
+    pub sigma_mm: Option<[f32; 3]>,
+}
+
+impl From<Measurement> for Point {
+    fn from(measured: Measurement) -> Self {
+        Self {
+            point_mm: measured.found.point_mm.into(),
+            gap_squared_mm2: measured.found.gap_squared_mm2,
+            sigma_mm: measured.covariance.map(|covariance| covariance.sigma_mm()),
+        }
+    }
+}
+
+impl Point {
+    /// The bits of the point, of the gap and, if there are any, of the standard deviations: what two
+    /// targets must agree on.
+    pub fn to_bits(&self) -> [Option<u32>; 7] {
+        let [x, y, z] = self.point_mm.map(|number| Some(number.to_bits()));
+        let [sigma_x, sigma_y, sigma_z] = match self.sigma_mm {
+            Some(sigma_mm) => sigma_mm.map(|number| Some(number.to_bits())),
+            None => [None; 3],
+        };
+        let gap = Some(self.gap_squared_mm2.to_bits());
+        [x, y, z, gap, sigma_x, sigma_y, sigma_z]
+    }
+}
+
+/// Who the device is and what it takes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Hello {
+    /// What kind of device this is.
+    pub device: Name,
+    /// Version of its application.
+    pub firmware: Name,
+    /// [`MAX_MATCHES`] as the device was built with.
+    pub max_matches: u8,
+    /// [`MAX_CHUNK`] as the device was built with, bytes.
+    pub max_chunk: u16,
+    /// Longest blob that a slot of its flash holds, bytes.
+    pub max_blob: u32,
+    /// Whether it takes signed blobs only.
+    pub needs_signature: bool,
+}
+
+/// How the device is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Status {
+    /// Since it started, ms.
+    pub uptime_ms: u64,
+    /// Requests answered with something other than a refusal, since start; stops at its maximum.
+    pub answered: u32,
+    /// Frames and requests refused since start; stops at its maximum.
+    pub refused: u32,
+    /// The blob in use, or the stable code of the runtime's `OpenError` that says why there is
+    /// none.
+    pub blob: Result<BlobStatus, u8>,
+    /// Which slot it is in.
+    pub active_slot: Option<u8>,
+    /// What each slot holds.
+    pub slots: [SlotState; 2],
+    /// The blob under way, if any.
+    pub update: Option<UpdateStatus>,
+    /// Longest blob that a slot holds, bytes.
+    pub max_blob: u32,
+    /// Blobs made active by an update since start; stops at its maximum.
+    pub updates: u32,
+    /// Rollbacks since start; stops at its maximum.
+    pub rollbacks: u32,
+    /// What the device knows of its own cameras; without it, any blob is taken.
+    pub rig: Option<Rig>,
+    /// The gaps of what it has measured with this blob; `None` before the first point.
+    pub gaps: Option<GapReport>,
+}
+
+/// What a slot holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum SlotState {
+    /// Nothing that was ever finished.
+    Empty,
+    /// The blob under way goes here.
+    Receiving,
+    /// A whole blob.
+    Holds(StoredBlob),
+    /// There is a commit record, but the blob behind it cannot be used.
+    Unusable {
+        /// Of its commit record.
+        sequence: u32,
+        /// The stable code of the runtime's `OpenError`.
+        open_error: u8,
+    },
+}
+
+/// How far an update has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct UpdateStatus {
+    /// Length of the new blob, bytes.
+    pub length: u32,
+    /// How much of it has been stored, bytes.
+    pub received: u32,
+    /// Its identity, as announced.
+    pub identity: [u8; IDENTITY_LENGTH],
+}
+
+/// What a device knows of the cameras it is built with, from its factory record.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Rig {
+    /// Serial number of the rig; empty if it has none.
+    pub serial: Name,
+    /// Its cameras, in the order of the blob.
+    pub cameras: Vec<CameraStatus, MAX_CAMERAS_LISTED>,
+}
+
+/// The blob in use.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BlobStatus {
+    /// Hash of the calibration it was packed from.
+    pub identity: [u8; IDENTITY_LENGTH],
+    /// Its length, bytes.
+    pub length: u32,
+    /// How many cameras it holds.
+    pub camera_count: u8,
+    /// The first of them, in order.
+    pub cameras: Vec<CameraStatus, MAX_CAMERAS_LISTED>,
+}
+
+/// A camera, of the blob in use or of the device itself.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CameraStatus {
+    /// Its name.
+    pub name: Name,
+    /// Width of the sensor, px.
+    pub width_px: u32,
+    /// Height of that sensor, px.
+    pub height_px: u32,
+}
+
+/// `text` as it travels: cut at the last character that fits.
+pub fn name(text: &str) -> Name {
+    let mut name = Name::new();
+    for character in text.chars() {
+        if name.push(character).is_err() {
+            break;
+        }
+    }
+    name
+}
+
+#[cfg(test)]
+mod tests;

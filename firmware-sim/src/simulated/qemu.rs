@@ -1,0 +1,389 @@
+//! The same application as a Cortex-M4F image in QEMU, its UART on a TCP port.
+
+mod error;
+mod memory;
+
+pub use error::QemuError;
+
+use std::io::ErrorKind;
+use std::net::{SocketAddr, TcpListener};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Output, Stdio};
+use std::sync::{Arc, mpsc};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use crate::client::DeviceClient;
+use crate::simulated::flash_file::{self, FlashFile};
+
+use memory::{Backing, Memory};
+
+/// From the start of QEMU to the first answer of the device. It takes about a quarter of a second;
+/// the rest is for machines under load.
+const START_LIMIT: Duration = Duration::from_secs(30);
+
+/// How long an image that ends by itself may run. Checks take a second; one that crashes hangs.
+const RUN_LIMIT: Duration = Duration::from_mins(3);
+
+/// Free ports tried before giving up: between the choice of one and QEMU's use of it, somebody else
+/// may take it.
+const PORT_TRIES: usize = 5;
+
+/// Runs its arguments and ends them when standard input closes. The parent holds the other end, so
+/// they end with it however it ends, a kill included.
+const ENDS_WITH_PARENT: &str = r#"
+exec 3<&0
+"$@" </dev/null 3<&- &
+child=$!
+{ read -r _ <&3; kill -KILL $child; } 2>/dev/null &
+watchdog=$!
+{ wait $child; } 2>/dev/null
+status=$?
+kill -KILL $watchdog 2>/dev/null
+exit $status
+"#;
+
+/// A device in QEMU. It ends when this is dropped, and when this process ends in any way.
+#[derive(Debug)]
+pub struct QemuDevice {
+    child: Child,
+    address: SocketAddr,
+    /// Held until QEMU has ended.
+    _flash: Arc<Backing>,
+}
+
+impl QemuDevice {
+    /// Starts `image` with its UART on `listen` (port 0 takes a free one) and its flash in
+    /// `flash_file`, as [`FlashFile::open`] takes it; without one, the flash is blank and in memory.
+    /// Returns once the device has answered.
+    ///
+    /// # Errors
+    /// [`QemuError`].
+    pub fn start(
+        listen: SocketAddr,
+        image: &Path,
+        flash_file: Option<&Path>,
+    ) -> Result<Self, QemuError> {
+        let flash = match flash_file {
+            Some(path) => FlashFile::open(path, None)?,
+            None => FlashFile::in_memory(flash_file::blank(None)?),
+        };
+        Self::start_with(listen, image, flash)
+    }
+
+    /// The same with a flash that has been opened.
+    ///
+    /// # Errors
+    /// [`QemuError`].
+    pub fn start_with(
+        listen: SocketAddr,
+        image: &Path,
+        flash: FlashFile,
+    ) -> Result<Self, QemuError> {
+        require_qemu()?;
+        let backing = Backing::of(flash).map_err(|source| QemuError::Io {
+            what: "a temporary file for the flash".into(),
+            source,
+        })?;
+        let backing = Arc::new(backing);
+        let tries = if listen.port() == 0 { PORT_TRIES } else { 1 };
+        let mut tried = 1;
+        loop {
+            match Self::start_on(free_address(listen)?, image, &backing) {
+                Err(QemuError::Ended { .. }) if tried < tries => tried += 1,
+                outcome => return outcome,
+            }
+        }
+    }
+
+    /// Where its UART can be reached.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Waits until QEMU ends.
+    ///
+    /// # Errors
+    /// [`QemuError::Io`] if it cannot be waited for.
+    pub fn wait(mut self) -> Result<ExitStatus, QemuError> {
+        // `Child::wait` would close the pipe, which would end QEMU at once.
+        let pipe = self.child.stdin.take();
+        let status = self.child.wait().map_err(|source| QemuError::Io {
+            what: "waiting for QEMU".into(),
+            source,
+        });
+        drop(pipe);
+        status
+    }
+
+    fn start_on(
+        address: SocketAddr,
+        image: &Path,
+        backing: &Arc<Backing>,
+    ) -> Result<Self, QemuError> {
+        let mut command = qemu_command(image, &Memory::File(backing.path()))?;
+        command.args(["-monitor", "none"]);
+        command.args([
+            "-serial",
+            &format!("tcp:{address},server=on,wait=off,nodelay=on"),
+        ]);
+        let not_started = |source| QemuError::Io {
+            what: "starting QEMU through sh".into(),
+            source,
+        };
+        let child = command
+            .stdin(Stdio::piped())
+            .stdout(backing.lock().map_err(not_started)?)
+            .spawn()
+            .map_err(not_started)?;
+        let mut device = Self {
+            child,
+            address,
+            _flash: Arc::clone(backing),
+        };
+        device.wait_until_it_answers()?;
+        Ok(device)
+    }
+
+    fn wait_until_it_answers(&mut self) -> Result<(), QemuError> {
+        let deadline = Instant::now() + START_LIMIT;
+        loop {
+            let remaining = deadline
+                .saturating_duration_since(Instant::now())
+                .max(Duration::from_millis(1));
+            match DeviceClient::connect_within(&format!("tcp:{}", self.address), remaining) {
+                Ok(_) => return Ok(()),
+                Err(error) if Instant::now() >= deadline => return Err(QemuError::Silent(error)),
+                Err(_) => {}
+            }
+            if let Ok(Some(status)) = self.child.try_wait() {
+                return Err(QemuError::Ended { status });
+            }
+            thread::sleep(Duration::from_millis(20));
+        }
+    }
+}
+
+impl Drop for QemuDevice {
+    fn drop(&mut self) {
+        // The pipe first: its end is what ends QEMU. Then the shell, so that no zombie stays.
+        drop(self.child.stdin.take());
+        let _ = self.child.wait();
+    }
+}
+
+/// Builds the image of this name if it is missing or stale, and returns where it is.
+///
+/// # Errors
+/// [`QemuError`]; what to install if there is no toolchain is said on standard error.
+pub fn build_image(image: &str) -> Result<PathBuf, QemuError> {
+    build_images(&[image])?;
+    Ok(image_path(image))
+}
+
+/// Builds the image of this name for processors without a floating-point unit, and returns where it
+/// is: the same image, whose arithmetic is the compiler's own.
+///
+/// # Errors
+/// As [`build_image`].
+pub fn build_soft_float_image(image: &str) -> Result<PathBuf, QemuError> {
+    build(&[image], &["--target", SOFT_FLOAT_TARGET], &[])?;
+    Ok(image_of(SOFT_FLOAT_TARGET, image))
+}
+
+/// Builds the image of this name without what reads blobs of old versions, and returns where it is.
+///
+/// # Errors
+/// As [`build_image`].
+pub fn build_newest_only_image(image: &str) -> Result<PathBuf, QemuError> {
+    let folder = root().join("target/embedded/newest-only");
+    let folder_argument = folder.display().to_string();
+    build(
+        &[image],
+        &["--no-default-features", "--target-dir", &folder_argument],
+        &[],
+    )?;
+    Ok(folder.join(TARGET).join("release").join(image))
+}
+
+/// Builds the images of these names if they are missing or stale, in one go.
+///
+/// # Errors
+/// As [`build_image`].
+pub fn build_images(images: &[&str]) -> Result<(), QemuError> {
+    build(images, &[], &[])
+}
+
+/// Builds the image of this name for the owner of a key, 64 hexadecimal digits: its device takes no
+/// blobs but those signed with it.
+///
+/// # Errors
+/// As [`build_image`].
+pub fn build_signed_image(image: &str, public_key: &str) -> Result<PathBuf, QemuError> {
+    let key = ("RAYS_PUBLIC_KEY", public_key);
+    build(&[image], &["--features", "signed"], &[key])?;
+    Ok(image_path(image))
+}
+
+fn build(
+    images: &[&str],
+    arguments: &[&str],
+    environment: &[(&str, &str)],
+) -> Result<(), QemuError> {
+    let root = root();
+    let script = root.join("scripts/embedded-cargo.sh");
+    if !script.is_file() {
+        return Err(QemuError::NoSources {
+            path: root.join("firmware-sim/cortex-m"),
+        });
+    }
+    let status = Command::new(&script)
+        .args(["build", "--quiet", "--locked", "--release"])
+        .args(arguments)
+        .envs(environment.iter().copied())
+        .args(images.iter().flat_map(|image| ["--bin", image]))
+        .stdin(Stdio::null())
+        .stdout(std::io::stderr())
+        .status()
+        .map_err(|source| QemuError::Io {
+            what: script.display().to_string(),
+            source,
+        })?;
+    if !status.success() {
+        return Err(QemuError::Build {
+            image: images.join("`, `"),
+            status,
+        });
+    }
+    Ok(())
+}
+
+/// Where the image of this name is once it has been built; it may be stale.
+pub fn image_path(image: &str) -> PathBuf {
+    image_of(TARGET, image)
+}
+
+fn image_of(target: &str, image: &str) -> PathBuf {
+    let folder = root().join("target/embedded").join(target);
+    folder.join("release").join(image)
+}
+
+/// The target of images, set in `cortex-m/.cargo/config.toml`.
+const TARGET: &str = "thumbv7em-none-eabihf";
+const SOFT_FLOAT_TARGET: &str = "thumbv7em-none-eabi";
+
+/// The workspace's folder.
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .unwrap_or(Path::new("."))
+}
+
+/// Runs an image that ends by itself, such as a check, and returns what it printed over semihosting
+/// and how it ended. One that still runs after three minutes is killed.
+///
+/// # Errors
+/// [`QemuError`].
+pub fn run_to_end(image: &Path, flash_file: Option<&Path>) -> Result<Output, QemuError> {
+    run_to_end_with(image, flash_file, &[])
+}
+
+/// The same in a time of its own, in which every instruction takes 2^`time_shift` nanoseconds and
+/// nothing else takes any: a timer then counts instructions.
+///
+/// # Errors
+/// [`QemuError`].
+pub fn run_counting(image: &Path, flash_file: &Path, time_shift: u32) -> Result<Output, QemuError> {
+    let time = format!("shift={time_shift}");
+    run_to_end_with(image, Some(flash_file), &["-icount", &time])
+}
+
+fn run_to_end_with(
+    image: &Path,
+    flash_file: Option<&Path>,
+    arguments: &[&str],
+) -> Result<Output, QemuError> {
+    require_qemu()?;
+    let memory = flash_file.map_or(Memory::Zero, Memory::StartsWith);
+    let mut child = qemu_command(image, &memory)?
+        .args(["-monitor", "none", "-serial", "none"])
+        .args(arguments)
+        .args(["-semihosting-config", "enable=on,target=native"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::inherit())
+        .spawn()
+        .map_err(|source| QemuError::Io {
+            what: "starting QEMU through sh".into(),
+            source,
+        })?;
+    // Held open until QEMU has ended or its time is up: its end is what ends QEMU, and
+    // `wait_with_output` would close it at once.
+    let pipe = child.stdin.take();
+    let (ended, end) = mpsc::channel::<()>();
+    let watchdog = thread::spawn(move || {
+        let _ = end.recv_timeout(RUN_LIMIT);
+        drop(pipe);
+    });
+    let output = child.wait_with_output();
+    drop(ended);
+    let _ = watchdog.join();
+    output.map_err(|source| QemuError::Io {
+        what: "waiting for QEMU".into(),
+        source,
+    })
+}
+
+/// QEMU on this board with this image, set to end with its parent; the caller adds serial line and
+/// monitor.
+fn qemu_command(image: &Path, memory: &Memory<'_>) -> Result<Command, QemuError> {
+    let mut command = Command::new("sh");
+    command.args(["-c", ENDS_WITH_PARENT, "sh", "qemu-system-arm"]);
+    command.args(memory.arguments()?);
+    command.args(["-cpu", "cortex-m4", "-display", "none"]);
+    command.arg("-kernel").arg(image);
+    Ok(command)
+}
+
+/// Makes sure that QEMU is installed.
+///
+/// # Errors
+/// As [`version`].
+pub fn require_qemu() -> Result<(), QemuError> {
+    version().map(|_| ())
+}
+
+/// What QEMU says of its version.
+///
+/// # Errors
+/// [`QemuError::NotInstalled`], with the remedy in its text.
+pub fn version() -> Result<String, QemuError> {
+    let output = Command::new("qemu-system-arm")
+        .arg("--version")
+        .stdin(Stdio::null())
+        .stderr(Stdio::null())
+        .output();
+    match output {
+        Ok(output) => {
+            let text = String::from_utf8_lossy(&output.stdout);
+            Ok(text.lines().next().unwrap_or_default().trim().to_owned())
+        }
+        Err(error) if error.kind() == ErrorKind::NotFound => Err(QemuError::NotInstalled),
+        Err(source) => Err(QemuError::Io {
+            what: "qemu-system-arm --version".into(),
+            source,
+        }),
+    }
+}
+
+/// `listen` with a free port in place of 0, after a look whether it can be had at all.
+fn free_address(listen: SocketAddr) -> Result<SocketAddr, QemuError> {
+    let listener = TcpListener::bind(listen).map_err(|source| QemuError::Listen {
+        address: listen,
+        source,
+    })?;
+    listener.local_addr().map_err(|source| QemuError::Listen {
+        address: listen,
+        source,
+    })
+}

@@ -1,0 +1,469 @@
+//! Power lost at any operation and any byte of an update and of a rollback, in three manners, and
+//! again while the device recovers; bits that flip at rest; flash that fails. Always exactly the old
+//! or the new blob, boot after boot the same one, and the device can be flashed again.
+//!
+//! `cargo test --release -p firmware-sim --test it power_cuts -- --nocapture` prints how many runs.
+
+use std::sync::LazyLock;
+
+use crate::rig;
+use firmware_sim::simulated::sim_flash::{BLOCK, Cut, PowerCut, SimFlash};
+use ray_device::app::Device;
+use ray_device::frame::checksum;
+use ray_device::port::{Clock, UNIT};
+use ray_device::protocol::{
+    Chunk, MAX_CHUNK, NewBlob, Refusal, Reply, Request, SlotState, Status, StoredBlob,
+};
+use split_mix::SplitMix;
+
+/// The factory block, and two slots of a log and two blocks for a blob.
+const BLOCKS: usize = 1 + 2 * 3;
+
+const OLDER: [u8; 16] = *b"an older rig    ";
+const OLD: [u8; 16] = *b"the old rig     ";
+const NEW: [u8; 16] = *b"the new rig     ";
+const NEXT: [u8; 16] = *b"the one after it";
+
+/// Units of an entry of the log.
+const ENTRY_UNITS: u64 = 4;
+
+struct Stopped;
+
+impl Clock for Stopped {
+    fn uptime_ms(&mut self) -> u64 {
+        0
+    }
+}
+
+fn device() -> Device<Stopped> {
+    Device::new("a device", Stopped)
+}
+
+/// Starts the device and asks it these, one after the other, until it refuses one.
+fn ask(flash: &mut SimFlash, requests: &[Request]) -> Result<Vec<Reply>, Refusal> {
+    let mut regions = flash.regions();
+    let mut device = device();
+    let mut epoch = device.epoch(&mut regions);
+    let mut replies = Vec::new();
+    for request in requests {
+        match epoch.respond_to(0, request) {
+            Reply::Refused(refusal) => return Err(refusal),
+            reply => replies.push(reply),
+        }
+    }
+    Ok(replies)
+}
+
+fn update(blob: &[u8], identity: [u8; 16]) -> Vec<Request> {
+    let mut requests = vec![Request::BeginUpdate(NewBlob {
+        length: blob.len() as u32,
+        checksum: checksum(blob),
+        identity,
+        rig_serial: None,
+        signature: None,
+    })];
+    for (offset, bytes) in (0..).step_by(MAX_CHUNK).zip(blob.chunks(MAX_CHUNK)) {
+        let bytes = heapless::Vec::from_slice(bytes).unwrap();
+        requests.push(Request::Chunk(Chunk { offset, bytes }));
+    }
+    requests.push(Request::FinishUpdate);
+    requests
+}
+
+fn update_to(identity: [u8; 16]) -> Vec<Request> {
+    update(&rig::blob_of(identity), identity)
+}
+
+fn stored(replies: &[Reply]) -> StoredBlob {
+    match replies.last() {
+        Some(Reply::Active(stored)) => *stored,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn status(flash: &mut SimFlash) -> Status {
+    match ask(flash, &[Request::Status]).unwrap().pop() {
+        Some(Reply::Status(status)) => status,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// The identity of the blob that the device uses when it is switched on now.
+fn active(flash: &mut SimFlash) -> Option<[u8; 16]> {
+    flash.power_up();
+    status(flash).blob.ok().map(|blob| blob.identity)
+}
+
+/// A flash with the old blob active, with or without an older one in the other slot.
+fn flash_with_old(has_older: bool) -> SimFlash {
+    let mut flash = SimFlash::blank(BLOCKS, 0).unwrap();
+    if has_older {
+        ask(&mut flash, &update_to(OLDER)).unwrap();
+    }
+    let replies = ask(&mut flash, &update_to(OLD)).unwrap();
+    assert_eq!(stored(&replies).slot, u8::from(has_older));
+    flash
+}
+
+fn copy(flash: &SimFlash, seed: u64) -> SimFlash {
+    SimFlash::with_contents(flash.contents(), seed).unwrap()
+}
+
+/// The operations of `requests` without any cut, and how many of them a start alone takes: none.
+fn operations(flash: &SimFlash, requests: &[Request]) -> u64 {
+    let mut flash = copy(flash, 0);
+    status(&mut flash);
+    assert_eq!(flash.operations(), 0, "a start that has nothing to settle");
+    ask(&mut flash, requests).unwrap();
+    flash.operations()
+}
+
+/// Cuts power during `requests` and, if there is another cut, while the device starts again. Then it
+/// must have one of the two blobs for good, and take another.
+fn survive(
+    before: &SimFlash,
+    requests: &[Request],
+    cuts: &[PowerCut],
+    seed: u64,
+    either: [[u8; 16]; 2],
+) -> [u8; 16] {
+    static UPDATE_TO_NEXT: LazyLock<Vec<Request>> = LazyLock::new(|| update_to(NEXT));
+    let context = || format!("{cuts:?}, seed {seed}");
+    let mut flash = copy(before, seed);
+    flash.plan_cut(cuts.first().copied());
+    let outcome = ask(&mut flash, requests);
+    for &cut in cuts.iter().skip(1) {
+        flash.power_up();
+        flash.plan_cut(Some(cut));
+        let _ = ask(&mut flash, &[Request::Status]);
+    }
+    let found = active(&mut flash);
+    let found = found.unwrap_or_else(|| panic!("no blob: {}", context()));
+    assert!(either.contains(&found), "{found:?}: {}", context());
+    if outcome.is_ok() {
+        assert_eq!(found, either[1], "it was acknowledged: {}", context());
+    }
+    // A seal that wavers may be found wanting by a later start, which then writes one more entry.
+    let mut written = 0;
+    for boot in 0..3 {
+        assert_eq!(
+            active(&mut flash),
+            Some(found),
+            "boot {boot}: {}",
+            context()
+        );
+        written += flash.operations();
+    }
+    let is_sound = cuts.iter().all(|cut| cut.cut != Cut::Weak);
+    let limit = if is_sound { 0 } else { 2 * ENTRY_UNITS };
+    assert!(written <= limit, "{written} operations: {}", context());
+    if let Err(refusal) = ask(&mut flash, &UPDATE_TO_NEXT) {
+        panic!("not flashable, {refusal}: {}", context());
+    }
+    assert_eq!(active(&mut flash), Some(NEXT), "{}", context());
+    let replies = ask(&mut flash, &[Request::Rollback]);
+    assert!(replies.is_ok(), "{replies:?}: {}", context());
+    assert_eq!(active(&mut flash), Some(found), "{}", context());
+    found
+}
+
+/// `SEEDS=10` in the environment draws ten times as often.
+fn seeds() -> u64 {
+    let seeds = std::env::var("SEEDS").ok();
+    seeds.and_then(|text| text.parse().ok()).unwrap_or(1)
+}
+
+const MANNERS: [Cut; 3] = [Cut::Clean, Cut::Torn, Cut::Weak];
+
+/// Places inside an operation: each byte of a unit; of a block, all that differ in what they hit.
+fn bytes_of(operation: u64, erases: &[u64]) -> Vec<usize> {
+    if erases.contains(&operation) {
+        vec![
+            0, 1, 7, 8, 24, 31, 32, 33, 40, 64, 100, 1000, 2048, 4095, 4096,
+        ]
+    } else {
+        (0..=UNIT).collect()
+    }
+}
+
+/// The erases of an update: the log's, and each block's before its first byte.
+fn erases(length: usize) -> Vec<u64> {
+    let units_in_block = (BLOCK / UNIT) as u64;
+    let blocks = length.div_ceil(BLOCK) as u64;
+    let first_of = |block: u64| 1 + block * (units_in_block + 1);
+    std::iter::once(0)
+        .chain((0..blocks).map(first_of))
+        .collect()
+}
+
+#[test]
+fn a_cut_at_every_byte_of_an_update() {
+    let requests = update_to(NEW);
+    let erases = erases(rig::blob_of(NEW).len());
+    let mut runs = 0;
+    let mut became_new = 0;
+    for has_older in [false, true] {
+        let before = flash_with_old(has_older);
+        for operation in 0..operations(&before, &requests) {
+            for byte in bytes_of(operation, &erases) {
+                for cut in MANNERS {
+                    for seed in 0..seeds() {
+                        let cut = PowerCut {
+                            operation,
+                            byte,
+                            cut,
+                        };
+                        let found = survive(&before, &requests, &[cut], seed, [OLD, NEW]);
+                        runs += 1;
+                        became_new += u32::from(found == NEW);
+                    }
+                }
+            }
+        }
+    }
+    println!("cuts during an update: {runs} runs, all survived; {became_new} with the new blob");
+    assert!(became_new > 0 && runs > 10_000);
+}
+
+#[test]
+fn a_cut_at_every_byte_of_a_rollback() {
+    let before = flash_with_old(true);
+    let requests = [Request::Rollback];
+    let mut runs = 0;
+    let mut became_new = 0;
+    for operation in 0..operations(&before, &requests) {
+        for byte in 0..=UNIT {
+            for cut in MANNERS {
+                for seed in 0..20 * seeds() {
+                    let cut = PowerCut {
+                        operation,
+                        byte,
+                        cut,
+                    };
+                    let found = survive(&before, &requests, &[cut], seed, [OLD, OLDER]);
+                    runs += 1;
+                    became_new += u32::from(found == OLDER);
+                }
+            }
+        }
+    }
+    println!("cuts during a rollback: {runs} runs, all survived; {became_new} rolled back");
+    assert!(became_new > 0 && became_new < runs);
+}
+
+/// The first cut hits the commit or the erase of the log, where a start has something to settle.
+#[test]
+fn a_second_cut_while_the_device_recovers() {
+    let requests = update_to(NEW);
+    let mut runs = 0;
+    for has_older in [false, true] {
+        let before = flash_with_old(has_older);
+        let total = operations(&before, &requests);
+        for first in std::iter::once(0).chain(total - 8..total) {
+            for byte in [0, 1, 4, 7, 8] {
+                for cut in [Cut::Torn, Cut::Weak] {
+                    let first = PowerCut {
+                        operation: first,
+                        byte,
+                        cut,
+                    };
+                    for operation in 0..5 {
+                        for byte in [0, 3, 7, 8] {
+                            for cut in MANNERS {
+                                let second = PowerCut {
+                                    operation,
+                                    byte,
+                                    cut,
+                                };
+                                for seed in 0..2 * seeds() {
+                                    let cuts = [first, second];
+                                    survive(&before, &requests, &cuts, seed, [OLD, NEW]);
+                                    runs += 1;
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+    println!("a second cut during recovery: {runs} runs, all survived");
+}
+
+/// As unlucky as it gets: up to eight cuts in a row, each anywhere.
+#[test]
+fn cut_after_cut() {
+    let mut random = SplitMix(7);
+    let mut runs = 0;
+    let befores = [flash_with_old(false), flash_with_old(true)];
+    let update = update_to(NEW);
+    let total = operations(&befores[0], &update);
+    for seed in 0..10_000 * seeds() {
+        let mut below = |limit: u64| random.next() % limit;
+        let before = &befores[below(2) as usize];
+        let first = match below(4) {
+            0 => below(total),
+            _ => total - 1 - below(8),
+        };
+        let mut cuts = vec![first];
+        cuts.extend((0..below(8)).map(|_| 0));
+        let cuts: Vec<PowerCut> = cuts
+            .into_iter()
+            .enumerate()
+            .map(|(number, operation)| PowerCut {
+                operation: if number == 0 { operation } else { below(6) },
+                byte: below(UNIT as u64 + 1) as usize,
+                cut: MANNERS[below(3) as usize],
+            })
+            .collect();
+        survive(before, &update, &cuts, seed, [OLD, NEW]);
+        runs += 1;
+    }
+    println!("up to eight cuts in a row: {runs} runs, all survived");
+}
+
+/// One bit, anywhere in the flash: the device says so or does not need it, never uses a damaged blob,
+/// and can be flashed.
+#[test]
+fn a_bit_that_flips_at_rest() {
+    let before = {
+        let mut flash = flash_with_old(true);
+        ask(&mut flash, &update_to(NEW)).unwrap();
+        flash
+    };
+    let blob_length = rig::blob_of(NEW).len();
+    let layout = copy(&before, 0).layout();
+    let mut runs = 0;
+    let mut kept = 0;
+    for slot in [0, 1] {
+        let start = layout.slot_start(slot) as usize;
+        let logs = start..start + 4 * 32;
+        let blobs = start + BLOCK..start + BLOCK + blob_length;
+        for address in logs.chain(blobs).chain([0, 100]) {
+            let mut flash = copy(&before, 0);
+            flash.flip(address, address as u32);
+            let found = active(&mut flash).expect("a blob is left");
+            assert!(found == NEW || found == OLD, "{address:#x}: {found:?}");
+            kept += u32::from(found == NEW);
+            assert_eq!(active(&mut flash), Some(found), "{address:#x}");
+            // A bit that comes back does not bring its blob back.
+            flash.flip(address, address as u32);
+            assert_eq!(active(&mut flash), Some(found), "{address:#x}");
+            ask(&mut flash, &update_to(NEXT)).unwrap();
+            assert_eq!(active(&mut flash), Some(NEXT), "{address:#x}");
+            runs += 1;
+        }
+    }
+    println!("bits flipped at rest: {runs}, all survived; {kept} without losing the newest blob");
+    // Only a flip in the newest blob itself takes it away.
+    assert_eq!(runs - kept, blob_length as u32);
+}
+
+/// When it says that the update failed, the old blob stays, now and later; a log entry that does not
+/// take its record is left out.
+#[test]
+fn flash_that_fails_is_told_and_the_old_blob_stays() {
+    let before = flash_with_old(true);
+    let requests = update_to(NEW);
+    let slot = before.layout().slot_start(0) as usize;
+    let blob_length = rig::blob_of(NEW).len();
+    let mut runs = 0;
+    for address in (0..blob_length).step_by(UNIT) {
+        let mut flash = copy(&before, 1);
+        flash.break_unit(slot + BLOCK + address);
+        let refusal = ask(&mut flash, &requests).unwrap_err();
+        let place = (slot + BLOCK + address) as u32;
+        assert!(
+            matches!(refusal, Refusal::FlashFailed { address, .. } if address == place),
+            "{refusal:?}"
+        );
+        assert_eq!(active(&mut flash), Some(OLD));
+        flash.repair();
+        ask(&mut flash, &requests).unwrap();
+        assert_eq!(active(&mut flash), Some(NEW));
+        runs += 1;
+    }
+    for block in 0..2 {
+        let mut flash = copy(&before, 1);
+        flash.break_block(slot + block * BLOCK);
+        assert!(matches!(
+            ask(&mut flash, &requests),
+            Err(Refusal::FlashFailed { .. })
+        ));
+        assert_eq!(active(&mut flash), Some(OLD));
+        runs += 1;
+    }
+    for unit in 0..4 {
+        // One entry is left out.
+        let mut flash = copy(&before, 1);
+        flash.break_unit(slot + unit * UNIT);
+        ask(&mut flash, &requests).unwrap();
+        assert_eq!(active(&mut flash), Some(NEW));
+        // None takes it.
+        let mut flash = copy(&before, 1);
+        for entry in 0..128 {
+            flash.break_unit(slot + entry * 32 + unit * UNIT);
+        }
+        assert!(matches!(
+            ask(&mut flash, &requests),
+            Err(Refusal::FlashFailed { .. })
+        ));
+        assert_eq!(active(&mut flash), Some(OLD));
+        assert_eq!(active(&mut flash), Some(OLD));
+        runs += 2;
+    }
+    println!("failing blocks and units: {runs} runs, all survived");
+}
+
+#[test]
+fn an_update_erases_each_block_once_and_nothing_of_the_active_slot() {
+    let mut flash = copy(&flash_with_old(false), 0);
+    let active_slot = flash.contents()[BLOCK..4 * BLOCK].to_vec();
+    ask(&mut flash, &update_to(NEW)).unwrap();
+    assert_eq!(flash.wear(), [0, 0, 0, 0, 1, 1, 0]);
+    assert_eq!(flash.contents()[BLOCK..4 * BLOCK], active_slot);
+    // The same blob once more takes nothing at all.
+    let replies = ask(&mut flash, &update_to(NEW)[..1]).unwrap();
+    assert_eq!(stored(&replies).slot, 1);
+    assert_eq!(flash.wear(), [0, 0, 0, 0, 1, 1, 0]);
+    ask(&mut flash, &[Request::Rollback]).unwrap();
+    assert_eq!(flash.wear(), [0, 0, 0, 0, 1, 1, 0]);
+    assert_eq!(active(&mut flash), Some(OLD));
+}
+
+#[test]
+fn rollbacks_end_when_the_log_is_full_and_a_flash_helps() {
+    let mut flash = flash_with_old(true);
+    let mut count = 0;
+    let refusal = loop {
+        match ask(&mut flash, &[Request::Rollback]) {
+            Ok(_) => count += 1,
+            Err(refusal) => break refusal,
+        }
+    };
+    assert_eq!(refusal, Refusal::LogFull);
+    // 128 entries in each slot, of which a commit takes two and a few are kept free.
+    assert!((100..128).contains(&count), "{count}");
+    ask(&mut flash, &update_to(NEW)).unwrap();
+    assert_eq!(active(&mut flash), Some(NEW));
+    assert!(matches!(
+        ask(&mut flash, &[Request::Rollback]),
+        Ok(_) | Err(Refusal::LogFull)
+    ));
+}
+
+#[test]
+fn a_few_hundred_updates_in_a_row() {
+    let mut flash = SimFlash::blank(BLOCKS, 0).unwrap();
+    let blobs = [update_to(OLD), update_to(NEW), update_to(NEXT)];
+    for round in 0..300_usize {
+        let replies = ask(&mut flash, &blobs[round % 3]).unwrap();
+        assert_eq!(stored(&replies).sequence, round as u32 + 1);
+    }
+    // Every other update goes to either slot, so each block that is used wears the same.
+    assert_eq!(flash.wear(), [0, 150, 150, 0, 150, 150, 0]);
+    let SlotState::Holds(stored) = status(&mut flash).slots[1] else {
+        panic!("slot 1 holds the last one");
+    };
+    assert_eq!((stored.sequence, stored.identity), (300, NEXT));
+}

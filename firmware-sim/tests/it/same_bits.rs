@@ -1,0 +1,70 @@
+//! The same bits everywhere: 100,000 random matches of every golden blob, on the host, on a Cortex-M4F
+//! and without a floating-point unit, both in QEMU.
+
+use std::path::{Path, PathBuf};
+
+use firmware_cost::same_bits::{Digest, digest};
+use firmware_sim::simulated::qemu;
+use ray_runtime::RayBlob;
+
+const MATCHES: u32 = 100_000;
+
+fn blobs() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/golden");
+    let files = std::fs::read_dir(folder).unwrap();
+    let mut blobs: Vec<PathBuf> = files
+        .map(|file| file.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "rays"))
+        .collect();
+    blobs.sort();
+    assert!(blobs.len() >= 4, "{blobs:?}");
+    blobs
+}
+
+fn on_host(path: &Path) -> Digest {
+    let contents = std::fs::read(path).unwrap();
+    let mut words = vec![0_u64; contents.len().div_ceil(8)];
+    let (bytes, _) = bytemuck::cast_slice_mut(&mut words).split_at_mut(contents.len());
+    bytes.copy_from_slice(&contents);
+    digest(&RayBlob::open(bytes).unwrap(), MATCHES).unwrap()
+}
+
+fn in_image(image: &Path, blob: &Path) -> Digest {
+    let output = qemu::run_to_end(image, Some(blob)).unwrap();
+    let printed = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{}: {printed}", blob.display());
+    let (checksum, points) = printed.trim().split_once(' ').unwrap();
+    Digest {
+        checksum: u32::from_str_radix(checksum, 16).unwrap(),
+        points: points.parse().unwrap(),
+    }
+}
+
+#[test]
+fn host_and_cortex_m4f_answer_the_same_bits() {
+    let image = qemu::build_image("same_bits").unwrap();
+    for blob in blobs() {
+        let host = on_host(&blob);
+        // A fifth of the pairs see something in front of both cameras.
+        assert!(host.points > MATCHES / 5, "{}: {host:?}", blob.display());
+        assert_eq!(in_image(&image, &blob), host, "{}", blob.display());
+    }
+}
+
+#[test]
+fn without_a_floating_point_unit_the_bits_are_the_same() {
+    let image = qemu::build_soft_float_image("same_bits").unwrap();
+    let blobs = blobs();
+    // By far the longest of these tests: half of the blobs beside the others.
+    let (first, second) = blobs.split_at(blobs.len() / 2);
+    let check = |blobs: &[PathBuf]| {
+        for blob in blobs {
+            let (found, host) = (in_image(&image, blob), on_host(blob));
+            assert_eq!(found, host, "{}", blob.display());
+        }
+    };
+    std::thread::scope(|threads| {
+        threads.spawn(|| check(first));
+        check(second);
+    });
+}

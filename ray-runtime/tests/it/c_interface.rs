@@ -1,0 +1,434 @@
+//! The C interface in `c/`: `rays.h` says what the Rust code does, the example gives the bits of Rust on the
+//! host and, where a cross compiler is there, on Arm in QEMU, with an FPU and without; a panic would not link.
+
+use ray_runtime::{
+    Aligned, EpipolarCurve, LookupError, MeasureError, Measurement, OpenError, PixelPoint,
+    ProjectError, Ray, RayBlob, Readout, ReadoutError, SensorWindow, Table, Triangulation,
+};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::sync::{Mutex, PoisonError};
+
+static GOLDEN: [(&str, &Aligned<[u8]>); 4] = [
+    (
+        "stereo-v1.rays",
+        &Aligned(*include_bytes!("../../../data/golden/stereo-v1.rays")),
+    ),
+    (
+        "stereo-v2.rays",
+        &Aligned(*include_bytes!("../../../data/golden/stereo-v2.rays")),
+    ),
+    (
+        "stereo-v3-fast.rays",
+        &Aligned(*include_bytes!("../../../data/golden/stereo-v3-fast.rays")),
+    ),
+    (
+        "stereo-v3-small.rays",
+        &Aligned(*include_bytes!("../../../data/golden/stereo-v3-small.rays")),
+    ),
+];
+
+const HEADER: &str = include_str!("../../c/rays.h");
+/// As strict as a C compiler gets.
+const WARNINGS: [&str; 4] = ["-Wall", "-Wextra", "-Wpedantic", "-Werror"];
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .unwrap()
+        .to_owned()
+}
+
+fn c_folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("c")
+}
+
+/// A file that a test makes.
+fn made(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join(name)
+}
+
+/// What a command printed, which must succeed.
+fn succeed(command: &mut Command) -> String {
+    let output = run(command);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        output.status.success(),
+        "{command:?}: {}\n{said}",
+        output.status
+    );
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn run(command: &mut Command) -> Output {
+    command.stdin(Stdio::null()).output().unwrap_or_else(|error| {
+        panic!("{command:?} cannot be run ({error}): install a C compiler, or run scripts/install-embedded.sh")
+    })
+}
+
+/// Builds the library for the host, in a target folder of its own and without what the cargo that
+/// runs this test left in the environment.
+fn build_for_host(name: &str, more: &[&str]) -> PathBuf {
+    // One at a time: each build puts its library in the same place.
+    static BUILDING: Mutex<()> = Mutex::new(());
+    let _building = BUILDING.lock().unwrap_or_else(PoisonError::into_inner);
+    let target_dir = root().join("target/c");
+    let mut command = Command::new(env!("CARGO"));
+    command
+        .args(["build", "--release", "--locked", "--quiet"])
+        .args(more)
+        .current_dir(c_folder())
+        .env("CARGO_TARGET_DIR", &target_dir)
+        .env_remove("RUSTFLAGS")
+        .env_remove("CARGO_ENCODED_RUSTFLAGS");
+    succeed(&mut command);
+    let library = made(name);
+    std::fs::copy(target_dir.join("release/librays.a"), &library).unwrap();
+    library
+}
+
+fn link_for_host(library: &Path, program: &Path) -> Command {
+    let mut command = Command::new("cc");
+    command
+        .args(["-std=c99", "-O2"])
+        .args(WARNINGS)
+        .args(["example.c", "host.c"])
+        .arg(library)
+        .arg("-o")
+        .arg(program)
+        .current_dir(c_folder());
+    command
+}
+
+/// The pixels of `example.c`.
+struct Pixels(u32);
+
+impl Pixels {
+    fn next(&mut self) -> PixelPoint {
+        let [u, v] = [64, 48].map(|extent_px: u32| {
+            self.0 = self.0.wrapping_mul(1664525).wrapping_add(1013904223);
+            let steps = (self.0 >> 8) % ((extent_px + 1) << 14);
+            steps as f32 / 16384.0 - 1.0
+        });
+        PixelPoint::new(u, v)
+    }
+}
+
+/// What `example.c` must print for a blob, and how many points are in it.
+fn expected(blob: &RayBlob<'_>) -> (String, usize) {
+    let (cameras, tests) = (blob.camera_count(), blob.run_self_tests().unwrap());
+    let mut text = format!("cameras {cameras:02x}, self-tests {tests:02x} passed\n");
+    text += &expected_window(blob);
+    let mut pixels = Pixels(1);
+    let mut points = 0;
+    for number in 0..4000 {
+        let (first, second) = ((0, pixels.next()), (1, pixels.next()));
+        let ray = blob.lookup(1, second.1).map_err(LookupError::code);
+        let of_ray = |ray: Ray| {
+            [ray.origin_mm, ray.direction]
+                .map(<[f32; 3]>::from)
+                .concat()
+        };
+        text += &field(ray.map(of_ray));
+
+        let of_point =
+            |found: Triangulation| [found.point_mm.as_slice(), &[found.gap_squared_mm2]].concat();
+        let point = blob.triangulate(first, second);
+        points += usize::from(point.is_ok());
+        text += &field(point.map(of_point).map_err(MeasureError::code));
+        if let (Ok(point), 0) = (point, number % 32) {
+            text += &expected_search(blob, first, &point);
+        }
+
+        let measured = blob.triangulate_with_covariance(first, second);
+        let of_measurement = |measured: Measurement| {
+            let sigma_mm = measured.covariance.map(|c| c.sigma_mm().to_vec());
+            [of_point(measured.found), sigma_mm.unwrap_or_default()].concat()
+        };
+        text += &field(measured.map(of_measurement).map_err(MeasureError::code));
+        text.push('\n');
+    }
+    (text, points)
+}
+
+/// What `print_search` must print.
+fn expected_search(
+    blob: &RayBlob<'_>,
+    first: (usize, PixelPoint),
+    point: &Triangulation,
+) -> String {
+    let of_pixel = |pixel: PixelPoint| vec![pixel.u, pixel.v];
+    let seen = |pixel: Result<PixelPoint, ProjectError>| {
+        field(pixel.map(of_pixel).map_err(ProjectError::code))
+    };
+    let pixel = blob.project(1, &point.point_mm);
+    let mut text = seen(pixel);
+    if let Ok(pixel) = pixel {
+        let start = PixelPoint::new(pixel.u + 2.5, pixel.v);
+        text += &seen(blob.project_near(1, &point.point_mm, start));
+    }
+    let of_curve = |curve: EpipolarCurve<'_>| {
+        curve
+            .flat_map(|at| [of_pixel(at.pixel), at.point_mm.as_slice().to_vec()].concat())
+            .collect()
+    };
+    let curve = blob.epipolar_curve(first, 1, [100.0, 3000.0], 8);
+    text + &field(curve.map(of_curve).map_err(MeasureError::code))
+}
+
+/// What `print_window` must print.
+fn expected_window(blob: &RayBlob<'_>) -> String {
+    let camera = blob.camera(1).unwrap();
+    let sensor @ [width, height] = [camera.sensor_width, camera.sensor_height];
+    let readout = Readout {
+        sensor,
+        first: [0, height / 2],
+        image: [width / 2, height / 4],
+        binning: [2, 2],
+    };
+    let window = SensorWindow::new(&camera, &readout).unwrap();
+    let sensor = window.to_sensor(PixelPoint::new(3.25, 7.5));
+    let back = window.from_sensor(sensor);
+    let bits = field(Ok(vec![sensor.u, sensor.v, back.u, back.v]));
+    format!("window{bits}\n")
+}
+
+/// An answer's bits behind a zero, or its code.
+fn field(answer: Result<Vec<f32>, u8>) -> String {
+    match answer {
+        Ok(numbers) => numbers.iter().fold(" | 00".to_owned(), |text, number| {
+            text + &format!(" {:08x}", number.to_bits())
+        }),
+        Err(code) => format!(" | {code:02x}"),
+    }
+}
+
+/// Compares what a program printed for each golden blob with what Rust computes here.
+fn check_bits(mut print: impl FnMut(&Path) -> String) {
+    for (name, bytes) in GOLDEN {
+        let printed = print(&root().join("data/golden").join(name));
+        let (expected, points) = expected(&RayBlob::open(&bytes.0).unwrap());
+        assert!(points > 1000, "{name}: only {points} points");
+        for (number, (found, expected)) in printed.lines().zip(expected.lines()).enumerate() {
+            assert_eq!(found, expected, "{name}, line {number}: C left, Rust right");
+        }
+        assert_eq!(printed.len(), expected.len(), "{name}");
+    }
+}
+
+#[test]
+fn codes_of_the_header_are_those_of_rust() {
+    let (need, have) = (0, 0);
+    let open = [
+        ("TRUNCATED", OpenError::Truncated { need, have }),
+        ("BAD_MAGIC", OpenError::BadMagic { found: 0 }),
+        (
+            "WRONG_VERSION",
+            OpenError::WrongVersion {
+                found: 0,
+                supported: 0,
+            },
+        ),
+        ("TRAILING_BYTES", OpenError::TrailingBytes { need, have }),
+        (
+            "BAD_CRC",
+            OpenError::BadCrc {
+                stated: 0,
+                computed: 0,
+            },
+        ),
+        ("MISALIGNED", OpenError::Misaligned { offset: 0 }),
+        ("BAD_HEADER", OpenError::BadHeader),
+        ("BAD_META", OpenError::BadMeta),
+        ("BAD_PADDING", OpenError::BadPadding { at: 0 }),
+        (
+            "UNKNOWN_ENCODING",
+            OpenError::UnknownEncoding {
+                camera: 0,
+                found: 0,
+            },
+        ),
+        (
+            "BAD_LAYOUT",
+            OpenError::BadLayout {
+                camera: 0,
+                table: Table::Grid,
+            },
+        ),
+        (
+            "BAD_NUMBER",
+            OpenError::BadNumber {
+                camera: 0,
+                table: Table::Grid,
+            },
+        ),
+        ("BAD_PAIR", OpenError::BadPair { pair: 0 }),
+    ];
+    let measure = [
+        ("OUTSIDE", MeasureError::Outside { camera: 0 }),
+        (
+            "NO_SUCH_CAMERA",
+            MeasureError::NoSuchCamera {
+                camera: 0,
+                count: 0,
+            },
+        ),
+        ("PARALLEL", MeasureError::Parallel),
+        ("BEHIND", MeasureError::Behind),
+    ];
+    let others = [
+        ("UNSEEN", ProjectError::Unseen.code()),
+        (
+            "WRONG_SENSOR",
+            ReadoutError::WrongSensor {
+                calibrated: [0; 2],
+                found: [0; 2],
+            }
+            .code(),
+        ),
+        ("NOT_ON_SENSOR", ReadoutError::NotOnSensor.code()),
+    ];
+    let of_c = [
+        ("OK", 0),
+        ("BAD_ARGUMENT", 128),
+        ("NOT_OPEN", 129),
+        ("SELF_TEST_FAILED", 130),
+    ];
+    let mut expected: Vec<(String, u8)> = open
+        .map(|(name, error)| (name, error.code()))
+        .into_iter()
+        .chain(measure.map(|(name, error)| (name, error.code())))
+        .chain(others)
+        .chain(of_c)
+        .map(|(name, code)| (format!("RAYS_{name}"), code))
+        .collect();
+    let mut found: Vec<(String, u8)> = HEADER
+        .lines()
+        .filter_map(|line| {
+            let (name, rest) = line.trim().split_once(" = ")?;
+            let code = rest.split([',', ' ']).next()?;
+            Some((name.to_owned(), code.parse().ok()?))
+        })
+        .collect();
+    expected.sort();
+    found.sort();
+    assert_eq!(found, expected);
+}
+
+#[test]
+fn the_example_gives_the_bits_of_rust_on_the_host() {
+    let library = build_for_host("librays.a", &[]);
+    let program = made("example-host");
+    succeed(&mut link_for_host(&library, &program));
+    check_bits(|blob| succeed(Command::new(&program).arg(blob)));
+    // C++ takes the header, too.
+    let mut command = Command::new("c++");
+    command.args(["-std=c++11", "-fsyntax-only", "-x", "c++"]);
+    succeed(command.args(WARNINGS).arg("rays.h").current_dir(c_folder()));
+}
+
+#[test]
+fn what_cannot_be_opened_or_asked_has_its_code() {
+    let library = build_for_host("librays-misuse.a", &[]);
+    let program = made("misuse");
+    let mut command = Command::new("cc");
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/c_misuse.c");
+    command.args(["-std=c99", "-O2", "-I."]).args(WARNINGS);
+    command.arg(source).arg(library).arg("-o").arg(&program);
+    succeed(command.current_dir(c_folder()));
+    let printed = succeed(Command::new(&program).arg(root().join("data/golden/stereo-v2.rays")));
+    assert_eq!(printed, "all as it should be\n");
+}
+
+/// A kind of Arm: its Rust target, what its C compiler is told, and where QEMU runs it.
+struct Arm {
+    target: &'static str,
+    flags: &'static [&'static str],
+    machine: [&'static str; 2],
+}
+
+/// Ends with this code where there is no toolchain for a target.
+const NO_TOOLCHAIN: i32 = 3;
+
+#[test]
+fn the_example_gives_the_bits_of_rust_with_an_fpu() {
+    check_arm(&Arm {
+        target: "thumbv7em-none-eabihf",
+        flags: &["-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"],
+        machine: ["mps2-an386", "cortex-m4"],
+    });
+}
+
+#[test]
+fn the_example_gives_the_bits_of_rust_without_an_fpu() {
+    // Of the two, the smaller one has no division either.
+    check_arm(&Arm {
+        target: "thumbv7em-none-eabi",
+        flags: &["-mcpu=cortex-m4", "-mfloat-abi=soft"],
+        machine: ["mps2-an386", "cortex-m4"],
+    });
+    check_arm(&Arm {
+        target: "thumbv6m-none-eabi",
+        flags: &["-mcpu=cortex-m0", "-mfloat-abi=soft"],
+        machine: ["mps2-an385", "cortex-m3"],
+    });
+}
+
+fn check_arm(arm: &Arm) {
+    const COMPILER: &str = "arm-none-eabi-gcc";
+    if Command::new(COMPILER).arg("--version").output().is_err() {
+        eprintln!(
+            "{COMPILER} is missing, so C was not tried on {}: install gcc-arm-none-eabi, or run scripts/install-embedded.sh",
+            arm.target
+        );
+        return;
+    }
+    let mut build = Command::new(root().join("scripts/embedded-cargo.sh"));
+    build.args(["build", "--release", "--locked", "--quiet"]);
+    build.args(["--target", arm.target, "--manifest-path"]);
+    let output = run(build.arg(c_folder().join("Cargo.toml")));
+    let said = String::from_utf8_lossy(&output.stderr);
+    if output.status.code() == Some(NO_TOOLCHAIN) {
+        eprintln!("C was not tried on {}: {said}", arm.target);
+        return;
+    }
+    assert!(output.status.success(), "{}: {said}", arm.target);
+
+    let library = root().join("target/embedded").join(arm.target);
+    let image = made(&format!("example-{}.elf", arm.target));
+    let mut link = Command::new(COMPILER);
+    link.args(["-mthumb", "-std=c99", "-O2", "-ffreestanding", "-nostdlib"])
+        .args(arm.flags)
+        .args(WARNINGS)
+        // Without --gc-sections: no part of the library may refer to what exists nowhere.
+        .args(["-Wl,-z,noexecstack", "-T", "qemu.ld", "example.c", "qemu.c"])
+        .arg(library.join("release/librays.a"))
+        .arg("-o")
+        .arg(&image)
+        .current_dir(c_folder());
+    succeed(&mut link);
+    check_bits(|blob| {
+        let [machine, cpu] = arm.machine;
+        let file = blob.display().to_string().replace(',', ",,");
+        let loader = format!("loader,file={file},addr=0x21000000,force-raw=on");
+        let mut qemu = Command::new("timeout");
+        qemu.args(["120", "qemu-system-arm", "-machine", machine, "-cpu", cpu])
+            .args(["-display", "none", "-monitor", "none", "-serial", "none"])
+            .args(["-semihosting-config", "enable=on,target=native"])
+            .args(["-device", &loader, "-kernel"])
+            .arg(&image);
+        succeed(&mut qemu)
+    });
+}
+
+#[test]
+fn a_panic_in_the_library_does_not_link() {
+    let library = build_for_host("librays-panics.a", &["--features", "panics"]);
+    let output = run(&mut link_for_host(&library, &made("example-panics")));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success());
+    assert!(
+        said.contains("a_panic_is_reachable_in_this_library"),
+        "{said}"
+    );
+}

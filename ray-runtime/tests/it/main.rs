@@ -1,0 +1,10 @@
+//! The runtime from outside: golden blobs, blobs made by hand and damaged ones, and its C interface.
+
+mod c_interface;
+mod damage;
+mod document;
+mod golden;
+mod project;
+mod questions;
+mod test_blob;
+mod uncertainty;
