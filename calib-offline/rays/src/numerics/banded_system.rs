@@ -1,5 +1,7 @@
 //! Least squares whose unknowns meet only near ones: banded normal equations.
 
+use super::product::dot;
+
 /// Symmetric banded normal equations with four right-hand sides.
 pub struct BandedSystem {
     half_bandwidth: usize,
@@ -86,24 +88,6 @@ impl BandedSystem {
         }
         Some(self.right)
     }
-}
-
-/// Dot product in eight running sums, which the compiler keeps in vector registers.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (a_chunks, b_chunks) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = a_chunks
-        .remainder()
-        .iter()
-        .zip(b_chunks.remainder())
-        .map(|(x, y)| x * y)
-        .sum();
-    for (x, y) in a_chunks.zip(b_chunks) {
-        for k in 0..8 {
-            sums[k] += x[k] * y[k];
-        }
-    }
-    sums.iter().sum::<f64>() + rest
 }
 
 #[cfg(test)]

@@ -6,7 +6,9 @@
 //! substitution is made of products too. A dense matrix is one whose band is everything.
 
 use super::banded::BandedMatrix;
-use super::product::{View, column_major, column_major_mut, multiply, row_major, row_major_mut};
+use super::product::{
+    View, column_major, column_major_mut, dot, multiply, row_major, row_major_mut,
+};
 use nalgebra::{DMatrix, DVector};
 
 /// Rows of a block: wide enough for products to run at speed, small against a usual band (250).
@@ -362,24 +364,6 @@ pub fn gram(matrix: &[f64], begins: &[usize]) -> DMatrix<f64> {
         );
     }
     product
-}
-
-/// Dot product in eight lanes: a fixed order of additions that vectorizes.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut lanes = [0.0; 8];
-    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
-    let tail: f64 = a8
-        .remainder()
-        .iter()
-        .zip(b8.remainder())
-        .map(|(x, y)| x * y)
-        .sum();
-    for (x, y) in a8.zip(b8) {
-        for k in 0..8 {
-            lanes[k] += x[k] * y[k];
-        }
-    }
-    lanes.iter().sum::<f64>() + tail
 }
 
 #[cfg(test)]

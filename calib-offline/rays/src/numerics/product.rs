@@ -1,4 +1,4 @@
-//! Products of matrices that lie in slices with any strides.
+//! Products of vectors in slices, and of matrices that lie in slices with any strides.
 //!
 //! `nalgebra` hands a product to its fast kernels (chosen at run time by what the processor can
 //! do) only if no side is short; the loops that it falls back to read out of bounds when the
@@ -54,6 +54,24 @@ pub fn column_major_mut(
     stride: usize,
 ) -> ViewMut<'_> {
     ViewMut::from_slice_with_strides_mut(data, rows, columns, 1, stride)
+}
+
+/// Dot product in eight lanes: a fixed order of additions that vectorizes.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut lanes = [0.0; 8];
+    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
+    let tail: f64 = a8
+        .remainder()
+        .iter()
+        .zip(b8.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
+    for (x, y) in a8.zip(b8) {
+        for k in 0..8 {
+            lanes[k] += x[k] * y[k];
+        }
+    }
+    lanes.iter().sum::<f64>() + tail
 }
 
 #[cfg(test)]
