@@ -4,6 +4,7 @@
 //! share each time. Mixing takes the combination of the last few results whose differences `g(x) - x`
 //! nearly cancel.
 
+use calib_rays::numerics::SingularValues;
 use nalgebra::{DMatrix, DVector};
 use std::collections::VecDeque;
 
@@ -47,14 +48,13 @@ impl Mixing {
         }
         let newest = gap(last);
         let differences: Vec<DVector<f64>> = (0..last).map(|k| gap(k + 1) - gap(k)).collect();
-        let svd = DMatrix::from_columns(&differences).svd(true, true);
-        let cut = CUT * svd.singular_values.max();
-        match svd.solve(&newest, cut) {
-            Ok(amounts) => (0..last).fold(g.clone(), |mixed, k| {
-                mixed - (&pairs[k + 1].1 - &pairs[k].1) * amounts[k]
-            }),
-            Err(_) => g.clone(),
-        }
+        let Some(svd) = SingularValues::new(DMatrix::from_columns(&differences)) else {
+            return g.clone();
+        };
+        let amounts = svd.solve(newest, CUT);
+        (0..last).fold(g.clone(), |mixed, k| {
+            mixed - (&pairs[k + 1].1 - &pairs[k].1) * amounts[k]
+        })
     }
 }
 

@@ -7,7 +7,8 @@
 //! in the plane.
 
 use calib_rays::geometry::{RigidTransform, best_placement, so3};
-use nalgebra::{DMatrix, Matrix3, Matrix3x2, Vector2, Vector3};
+use calib_rays::numerics::SingularValues;
+use nalgebra::{Matrix3, Matrix3x2, MatrixXx3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Fewest poses of a placement: three points always have a circle.
@@ -48,13 +49,9 @@ fn common_plane(trajectories: &[Vec<Vector3<f64>>]) -> Option<Plane> {
             places.iter().map(move |place| place - mean)
         })
         .collect();
-    let matrix = DMatrix::from_fn(rows.len(), 3, |r, c| rows[r][c]);
-    let svd = matrix.svd(false, true);
-    let v_t = svd.v_t?;
-    let row = |k: usize| Vector3::new(v_t[(k, 0)], v_t[(k, 1)], v_t[(k, 2)]);
-    let normal_at = svd.singular_values.imin();
-    let normal = row(normal_at);
-    let first = row((normal_at + 1) % 3);
+    let svd = SingularValues::new(MatrixXx3::from_fn(rows.len(), |r, c| rows[r][c]))?;
+    let normal = svd.null_direction()?;
+    let first: Vector3<f64> = svd.right.column_iter().next()?.into_owned();
     Some(Plane {
         normal,
         axes: Matrix3x2::from_columns(&[first, normal.cross(&first)]),

@@ -4,6 +4,7 @@
 //! double precision is what its largest singular values say. The normal equations would square the
 //! condition number and lose half of those.
 
+use calib_rays::numerics::SingularValues;
 use nalgebra::DMatrix;
 
 /// The solution with the least norm, and how many singular values it uses.
@@ -22,65 +23,17 @@ const BELOW_CUT: f64 = 1e-3;
 /// Minimizes `|A x - b|` over the singular directions of A whose value is at least `cut` times the
 /// largest; `None` if A is not finite or empty.
 ///
-/// A is brought to a few rows by a Householder decomposition with column pivoting (Golub and Van
-/// Loan, 5.4.2), which ends when what is left lies below the cut; the singular values are then those
-/// of a small triangle. Cost: `2 m n r` for an `m x n` matrix of rank `r`.
-pub fn solve_truncated(mut a: DMatrix<f64>, mut b: DMatrix<f64>, cut: f64) -> Option<Truncated> {
-    let (rows, cols) = a.shape();
-    let mut order: Vec<usize> = (0..cols).collect();
-    let mut norms: Vec<f64> = a.column_iter().map(|c| c.norm_squared()).collect();
-    let largest = norms.iter().copied().fold(0.0, f64::max);
-    if !(largest > 0.0 && largest.is_finite() && b.iter().all(|x| x.is_finite())) {
+/// Cost: `3 m n r` for an `m x n` matrix of rank `r`.
+pub fn solve_truncated(a: DMatrix<f64>, b: DMatrix<f64>, cut: f64) -> Option<Truncated> {
+    if !b.iter().all(|x| x.is_finite()) {
         return None;
     }
-    let mut steps = 0;
-    while steps < rows.min(cols) {
-        let pivot = (steps..cols).max_by(|i, j| norms[*i].total_cmp(&norms[*j]))?;
-        a.swap_columns(steps, pivot);
-        order.swap(steps, pivot);
-        norms.swap(steps, pivot);
-        let column = a.column(steps).rows(steps, rows - steps).into_owned();
-        let length = column.norm();
-        if length <= BELOW_CUT * cut * largest.sqrt() {
-            break;
-        }
-        // The reflection that takes the column to a multiple of the first axis.
-        let mut v = column;
-        v[0] += length.copysign(v[0]);
-        let scale = 2.0 / v.norm_squared();
-        // Columns to the left are zero from here down.
-        for (matrix, from) in [(&mut a, steps), (&mut b, 0)] {
-            for c in from..matrix.ncols() {
-                let mut column = matrix.column_mut(c);
-                let mut part = column.rows_mut(steps, rows - steps);
-                let along = scale * part.dot(&v);
-                part.axpy(-along, &v, 1.0);
-            }
-        }
-        // Norms are taken anew: updated ones lose their digits where ranks end.
-        for (c, norm) in norms.iter_mut().enumerate().skip(steps + 1) {
-            *norm = a.column(c).rows(steps + 1, rows - steps - 1).norm_squared();
-        }
-        steps += 1;
-    }
-    let triangle = a.rows(0, steps).upper_triangle();
-    let svd = triangle.transpose().svd(true, true);
-    let (u, v_t) = (svd.u?, svd.v_t?);
-    let top = svd.singular_values.max();
-    let mut in_order = DMatrix::zeros(cols, b.ncols());
-    let mut rank = 0;
-    for (k, value) in svd.singular_values.iter().enumerate() {
-        if *value >= cut * top {
-            rank += 1;
-            let amounts = v_t.row(k) * b.rows(0, steps) / *value;
-            in_order += u.column(k) * amounts;
-        }
-    }
-    let mut solution = DMatrix::zeros(cols, b.ncols());
-    for (k, place) in order.iter().enumerate() {
-        solution.set_row(*place, &in_order.row(k));
-    }
-    Some(Truncated { solution, rank })
+    let svd = SingularValues::down_to(a, BELOW_CUT * cut)?;
+    let rank = svd.rank(cut);
+    (rank > 0).then(|| Truncated {
+        solution: svd.solve(b, cut),
+        rank,
+    })
 }
 
 #[cfg(test)]
@@ -112,11 +65,9 @@ mod tests {
         let b = DMatrix::from_fn(40, 2, |i, j| (0.3 * i as f64 + j as f64).sin());
         let cut = 1e-5;
         let found = solve_truncated(a.clone(), b.clone(), cut).unwrap();
-        let svd = a.svd(true, true);
-        let top = svd.singular_values.max();
-        let kept = svd.singular_values.iter().filter(|s| **s >= cut * top);
-        assert_eq!(found.rank, kept.count());
-        let full = svd.solve(&b, cut * top).unwrap();
+        let svd = SingularValues::new(a).unwrap();
+        assert_eq!(found.rank, svd.rank(cut));
+        let full = svd.solve(b, cut);
         // Round-off times the condition number kept.
         assert!((found.solution - &full).norm() < 1e-9 * full.norm());
     }

@@ -7,6 +7,7 @@ use calib_rays::field::uncertainty::{PairUncertainty, node_pixel, packed};
 use calib_rays::field::{CalibratedCamera, Rig};
 use calib_rays::geometry::so3::skew;
 use calib_rays::geometry::{PixelPoint, Ray, midpoint_by_shifts};
+use calib_rays::numerics::SingularValues;
 use nalgebra::{DMatrix, Matrix3x2, Vector3};
 
 /// Nodes of a grid along the longer side of the sensor.
@@ -14,7 +15,7 @@ const NODES_ALONG_LONGER_SIDE: usize = 11;
 /// Of the coarser grids at the least and largest distance of boards, which say with it what moves
 /// rigidly.
 const VOLUME_NODES_ALONG_LONGER_SIDE: usize = 8;
-/// Singular values below this count as zero: a rigid motion that moves no point (mm per rad or mm).
+/// Singular values below this share of the largest count as zero: a rigid motion that moves no point.
 pub(super) const RIGID_RANK_SHARE: f64 = 1e-9;
 
 impl Estimate {
@@ -223,7 +224,7 @@ fn without_rigid_motions(
         }
     }
     let moved = &to_points * &motions;
-    let best_motion = moved.pseudo_inverse(RIGID_RANK_SHARE).ok()? * to_points;
+    let best_motion = SingularValues::new(moved)?.pseudo_inverse(RIGID_RANK_SHARE) * to_points;
     let projector = DMatrix::identity(count, count) - motions * best_motion;
     Some(&projector * covariance * projector.transpose())
 }

@@ -17,6 +17,7 @@
 
 use super::homography::{PixelHomography, camera_matrix};
 use calib_rays::geometry::{PixelPoint, SensorSize};
+use calib_rays::numerics::SingularValues;
 use nalgebra::{DMatrix, Matrix2, Matrix3, Vector2, Vector3};
 
 /// A singular value this much smaller than the largest is zero: homographies from exact pixels
@@ -107,18 +108,12 @@ fn conic(pairs: &[[Vector3<f64>; 2]]) -> Option<ZhangCamera> {
         ];
         rows.row_mut(k).copy_from_slice(&row);
     }
-    if !rows.iter().all(|x| x.is_finite()) {
+    let svd = SingularValues::new(rows)?;
+    let value = &svd.values;
+    if value[4] <= ROUND_OFF * value[0] || value[5] > MOST_MISFIT * value[4] {
         return None;
     }
-    let svd = rows.svd(false, true);
-    let v_t = svd.v_t?;
-    let mut order: Vec<usize> = (0..UNKNOWNS).collect();
-    order.sort_by(|a, b| svd.singular_values[*b].total_cmp(&svd.singular_values[*a]));
-    let value = |place: usize| svd.singular_values[order[place]];
-    if value(4) <= ROUND_OFF * value(0) || value(5) > MOST_MISFIT * value(4) {
-        return None;
-    }
-    let b = v_t.row(order[5]);
+    let b = svd.right.column(5);
     let [b11, b12, b22, b13, b23, b33] = [b[0], b[1], b[2], b[3], b[4], b[5]];
     let determinant = b11 * b22 - b12 * b12;
     let cv = (b12 * b13 - b11 * b23) / determinant;

@@ -7,6 +7,7 @@
 //! and to warn, never to estimate.
 
 use calib_rays::geometry::PixelPoint;
+use calib_rays::numerics::SingularValues;
 use nalgebra::{Matrix3, SMatrix, SVector, SymmetricEigen, Vector3};
 
 /// The same corner in a first and a second camera.
@@ -38,10 +39,9 @@ impl FundamentalMatrix {
         let eigen = SymmetricEigen::new(normal);
         let null = eigen.eigenvectors.column(eigen.eigenvalues.imin());
         let any_rank = Matrix3::from_fn(|r, c| null[3 * r + c]);
-        let mut svd = any_rank.svd(true, true);
-        let smallest = svd.singular_values.imin();
-        svd.singular_values[smallest] = 0.0;
-        let rank_two = svd.recompose().ok()?;
+        let svd = SingularValues::new(any_rank)?;
+        let third = svd.left().column(2) * svd.right.column(2).transpose();
+        let rank_two = any_rank - third * svd.values[2];
         Some(Self(second_norm.transpose() * rank_two * first_norm))
     }
 
