@@ -1,7 +1,7 @@
 //! Posterior covariance of what a model predicts: where cameras see points, given what they were
 //! fitted to (METHOD 5).
 
-use super::assembly::Components;
+use super::components::Components;
 use super::model::{Layout, Model};
 use super::normal_equations::{NormalEquations, parameters_to_columns};
 use super::reduced::{Eliminated, Reduced};

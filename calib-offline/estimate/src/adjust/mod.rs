@@ -3,6 +3,7 @@
 //! on everything. METHOD 2.1 to 2.5.
 
 mod assembly;
+mod components;
 pub mod covariance;
 pub mod knots;
 pub mod levenberg;

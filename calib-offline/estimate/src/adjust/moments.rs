@@ -7,7 +7,7 @@
 //! `P_m P_n = sum_r A_r A_(m-r) A_(n-r) / A_(m+n-r) (2m+2n-4r+1) / (2m+2n-2r+1) P_(m+n-2r)`,
 //! `A_r = (2r - 1)!! / r!`.
 
-use super::assembly::{Components, pair};
+use super::components::{Components, pair};
 use calib_rays::field::polynomial::{AxisValues, terms};
 use nalgebra::DMatrix;
 

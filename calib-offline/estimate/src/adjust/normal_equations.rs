@@ -8,7 +8,8 @@
 //! border). What is left either way is a Schur complement; METHOD 2.5 has a picture of both orders.
 //! Nothing is ever formed that couples knots densely.
 
-use super::assembly::{self, Components, EXTRINSICS, ViewSums};
+use super::assembly::{self, EXTRINSICS, ViewSums};
+use super::components::Components;
 use super::model::{CameraModel, Layout, Model, Step};
 use super::objective::Weights;
 use super::observations::{Observations, ViewBasis};

@@ -5,7 +5,7 @@
 //! is its Schur complement. The border stays in the fields' own columns (see [`Components`]) and the
 //! poses'; only the product is carried over to parameters.
 //!
-//! [`Components`]: super::assembly::Components
+//! [`Components`]: super::components::Components
 
 use super::assembly::SplineSums;
 use calib_rays::numerics::banded::BandedMatrix;
