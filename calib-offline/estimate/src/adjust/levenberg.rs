@@ -1,7 +1,7 @@
 //! Levenberg-Marquardt on the blocked normal equations, weights and priors held fixed.
 
+use super::equations::normal_equations::NormalEquations;
 use super::model::Model;
-use super::normal_equations::NormalEquations;
 use super::objective::{Weights, cost};
 use super::observations::{Observations, ViewBasis};
 use super::priors::Priors;

@@ -1,6 +1,6 @@
 //! What is made as small as possible: weighted squares of the residuals, and the priors.
 
-use super::assembly::predict;
+use super::equations::assembly::predict;
 use super::model::Model;
 use super::observations::{Observations, ViewBasis};
 use super::priors::Priors;

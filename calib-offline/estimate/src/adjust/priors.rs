@@ -1,7 +1,7 @@
 //! What is known of the parameters beforehand: smoothness, and what is plausible. As densities they
 //! are Gaussian priors, as terms of the objective they are its regularization (METHOD 2.3).
 
-use super::knots::thin_plate;
+use super::equations::knots::thin_plate;
 use super::model::{CameraModel, Model};
 use calib_rays::numerics::banded::BandedMatrix;
 use nalgebra::DVector;

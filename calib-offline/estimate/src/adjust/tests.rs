@@ -1,9 +1,9 @@
 //! The blocked equations against dense ones of the same small problem, with everything that a
 //! model can have: splines, an offset, extrinsics, a bent board.
 
+use super::equations::normal_equations::NormalEquations;
 use super::levenberg::{Settings, minimize};
 use super::model::{CameraModel, Model, Step};
-use super::normal_equations::NormalEquations;
 use super::objective::{Weights, residuals};
 use super::observations::{Observations, ObservedCorner, ViewBlock};
 use super::priors::{CameraPriors, Priors};

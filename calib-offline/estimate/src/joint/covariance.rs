@@ -2,7 +2,7 @@
 
 use super::error::EstimateError;
 use super::estimate::Estimate;
-use crate::adjust::covariance::{Sighting, sighting_covariance};
+use crate::adjust::equations::covariance::{Sighting, sighting_covariance};
 use calib_rays::field::uncertainty::{PairUncertainty, node_pixel, packed};
 use calib_rays::field::{CalibratedCamera, Rig};
 use calib_rays::geometry::so3::skew;

@@ -1,10 +1,10 @@
 //! How strongly smoothness holds, from the data themselves: hyperparameters by the evidence, which is
 //! the marginal likelihood of the data (METHOD 2.4, 9A).
 
-use crate::adjust::knots::{thin_plate, thin_plate_ln_determinant};
+use crate::adjust::equations::knots::{thin_plate, thin_plate_ln_determinant};
+use crate::adjust::equations::reduced::Reduced;
 use crate::adjust::model::Layout;
 use crate::adjust::priors::{CameraPriors, Priors};
-use crate::adjust::reduced::Reduced;
 use crate::adjust::{CameraModel, Model};
 use calib_rays::field::knot_order::KnotOrder;
 use calib_rays::numerics::banded::BandedMatrix;

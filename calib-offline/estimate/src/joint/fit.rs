@@ -3,13 +3,13 @@
 use super::correlation::{effective_share, neighbor_correlation};
 use super::error::EstimateError;
 use super::evidence::Smoothness;
+use crate::adjust::equations::normal_equations::NormalEquations;
+use crate::adjust::equations::reduced::Reduced;
 use crate::adjust::levenberg::{self, Settings, StopReason};
 use crate::adjust::model::Layout;
-use crate::adjust::normal_equations::NormalEquations;
 use crate::adjust::objective::{self, Weights};
 use crate::adjust::observations::ViewBasis;
 use crate::adjust::priors::Priors;
-use crate::adjust::reduced::Reduced;
 use crate::adjust::robust::{StudentT, reweight};
 use crate::adjust::{Model, Observations};
 use nalgebra::Vector2;

@@ -4,7 +4,7 @@
 use super::covariance::{RIGID_RANK_SHARE, node, points_by_predictions};
 use super::error::EstimateError;
 use super::estimate::Estimate;
-use crate::adjust::covariance::sighting_covariance;
+use crate::adjust::equations::covariance::sighting_covariance;
 use calib_rays::field::{Rig, transport};
 use calib_rays::geometry::PixelPoint;
 use calib_rays::geometry::so3::skew;

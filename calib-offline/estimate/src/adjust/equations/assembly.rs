@@ -7,10 +7,10 @@
 //! tall matrices per view for the polynomials, a band for the spline.
 
 use super::components::{Components, pair};
-use super::model::{CameraModel, Model};
 use super::moments::FieldMoments;
-use super::observations::{Observations, ViewBasis, ViewBlock};
-use super::residual::{Linearization, linearize};
+use crate::adjust::model::{CameraModel, Model};
+use crate::adjust::observations::{Observations, ViewBasis, ViewBlock};
+use crate::adjust::residual::{Linearization, linearize};
 use calib_rays::field::knot_order::KnotOrder;
 use calib_rays::field::spline::AxisWeights;
 use calib_rays::geometry::so3::skew;

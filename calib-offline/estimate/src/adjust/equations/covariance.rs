@@ -2,10 +2,10 @@
 //! fitted to (METHOD 5).
 
 use super::components::Components;
-use super::model::{Layout, Model};
 use super::normal_equations::{NormalEquations, parameters_to_columns};
 use super::reduced::{Eliminated, Reduced};
-use super::residual::linearize;
+use crate::adjust::model::{Layout, Model};
+use crate::adjust::residual::linearize;
 use calib_rays::geometry::PixelPoint;
 use calib_rays::geometry::so3::skew;
 use calib_rays::numerics::cholesky::gram;

@@ -1,6 +1,6 @@
 //! The components of a camera's field, and where each stands among the columns of the equations.
 
-use super::model::CameraModel;
+use crate::adjust::model::CameraModel;
 
 /// The fixed functions behind each component of a camera's field, polynomials only.
 #[derive(Debug, Clone, Copy)]

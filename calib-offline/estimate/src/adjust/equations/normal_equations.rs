@@ -10,12 +10,12 @@
 
 use super::assembly::{self, EXTRINSICS, ViewSums};
 use super::components::Components;
-use super::model::{CameraModel, Layout, Model, Step};
-use super::objective::Weights;
-use super::observations::{Observations, ViewBasis};
-use super::priors::Priors;
 use super::reduced::{Eliminated, Reduced};
 use super::spline_block::{BorderColumns, EliminatedSpline, SplineBlock};
+use crate::adjust::model::{CameraModel, Layout, Model, Step};
+use crate::adjust::objective::Weights;
+use crate::adjust::observations::{Observations, ViewBasis};
+use crate::adjust::priors::Priors;
 use calib_rays::field::structured::StructuredBasis;
 use calib_rays::numerics::cholesky::{BandedCholesky, gram};
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
@@ -135,7 +135,7 @@ impl NormalEquations {
     fn add_view(
         &mut self,
         layout: &Layout,
-        view: &super::observations::ViewBlock,
+        view: &crate::adjust::observations::ViewBlock,
         sums: &ViewSums,
         to_columns: &DMatrix<f64>,
     ) {
