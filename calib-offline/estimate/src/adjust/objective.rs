@@ -1,8 +1,8 @@
 //! What is made as small as possible: weighted squares of the residuals, and the priors.
 
-use super::equations::assembly::predict;
 use super::model::Model;
 use super::observations::{Observations, ViewBasis};
+use super::prediction::predict;
 use super::priors::Priors;
 use nalgebra::Vector2;
 use rayon::prelude::*;

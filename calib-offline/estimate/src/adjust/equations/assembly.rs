@@ -10,52 +10,19 @@ use super::components::{Components, pair};
 use super::moments::FieldMoments;
 use crate::adjust::model::{CameraModel, Model};
 use crate::adjust::observations::{Observations, ViewBasis, ViewBlock};
-use crate::adjust::residual::{Linearization, linearize};
+use crate::adjust::prediction::{Seen, predict};
+use crate::adjust::residual::Linearization;
 use calib_rays::field::knot_order::KnotOrder;
 use calib_rays::field::spline::AxisWeights;
 use calib_rays::geometry::so3::skew;
 use calib_rays::numerics::banded::BandedMatrix;
-use nalgebra::{DMatrix, DMatrixView, Dyn, Vector2, Vector3};
+use nalgebra::{DMatrix, DMatrixView, Dyn, Vector2};
 
 /// Columns of the pose and of the extrinsics among a view's small columns; the board's terms and
 /// the gradient follow.
 pub const POSE: usize = 0;
 pub const EXTRINSICS: usize = 6;
 pub const BOARD: usize = 12;
-
-/// A corner as the model sees it.
-pub struct Seen {
-    /// `None` behind the camera.
-    pub linearization: Option<Linearization>,
-    /// The corner turned into the rig's axes about the board's origin, mm.
-    turned_in_board: Vector3<f64>,
-    /// The corner turned into the camera's axes about the rig's origin, mm.
-    turned_in_rig: Vector3<f64>,
-}
-
-/// The corners of a view as the model sees them.
-pub fn predict<'a>(
-    model: &'a Model,
-    observations: &'a Observations,
-    view: &'a ViewBlock,
-    basis: &'a ViewBasis,
-) -> impl Iterator<Item = Seen> + 'a {
-    let camera = &model.cameras[view.camera_idx];
-    let pose = &model.rig_from_board[view.pose_idx];
-    view.corners.iter().enumerate().map(move |(idx, corner)| {
-        let mut point = corner.point_in_board;
-        point.z += model.board_shape.height_mm(&observations.board, &point);
-        let turned_in_board = pose.rotation * point;
-        let turned_in_rig =
-            camera.camera_from_rig.rotation * (turned_in_board + pose.translation_mm);
-        let point_in_camera = turned_in_rig + camera.camera_from_rig.translation_mm;
-        Seen {
-            linearization: linearize(&basis.sample(&camera.field, idx), &point_in_camera),
-            turned_in_board,
-            turned_in_rig,
-        }
-    })
-}
 
 /// What one view contributes.
 pub struct ViewSums {

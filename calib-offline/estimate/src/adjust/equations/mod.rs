@@ -7,7 +7,7 @@
 //! picture of the matrix. The same equations formed densely, from differences of residuals, are the
 //! reference that they are tested against: `dense` in `adjust/tests.rs`.
 
-pub(super) mod assembly;
+mod assembly;
 mod components;
 pub mod covariance;
 pub mod knots;
