@@ -4,6 +4,7 @@
 use super::field_rows::FieldRows;
 use calib_rays::field::{CalibratedCamera, FieldSample, transport};
 use calib_rays::geometry::PixelPoint;
+use calib_rays::numerics::median;
 use nalgebra::{Matrix2, Vector2, Vector3};
 use ray_runtime::RayBlob;
 use rayon::prelude::*;
@@ -244,17 +245,12 @@ pub fn usual_px_per_mm(camera: &CalibratedCamera, distance_mm: f64) -> f64 {
     let sensor = camera.field.sensor;
     let at =
         |k: u32, extent: u32| (f64::from(k) + 0.5) / f64::from(STEPS) * f64::from(extent) - 0.5;
-    let mut scales: Vec<f64> = (0..STEPS * STEPS)
+    let scales = (0..STEPS * STEPS)
         .map(|k| PixelPoint::new(at(k % STEPS, sensor.width), at(k / STEPS, sensor.height)))
         .filter(|pixel| camera.coverage.contains(*pixel))
         .filter_map(|pixel| px_from_mm(&camera.field.sample(pixel), distance_mm))
         .map(|px_from_mm| px_from_mm.norm())
-        .filter(|scale| scale.is_finite())
-        .collect();
-    scales.sort_by(f64::total_cmp);
+        .filter(|scale| scale.is_finite());
     // An area too small to be met by the lattice has no usual scale and no limit either.
-    scales
-        .get(scales.len() / 2)
-        .copied()
-        .unwrap_or(f64::MAX / 10.0)
+    median(scales).unwrap_or(f64::MAX / 10.0)
 }

@@ -6,6 +6,7 @@ use calib_rays::field::polynomial::{self, AxisValues, Polynomial};
 use calib_rays::field::spline::AxisWeights;
 use calib_rays::field::{BaseLens, CoverageMask, FieldSample, RayField};
 use calib_rays::geometry::{PixelPoint, SensorSize};
+use calib_rays::numerics::median;
 use calib_rays::observed::{Corner, View};
 use nalgebra::{DMatrix, Matrix2, Vector2, Vector3};
 use std::sync::Arc;
@@ -69,7 +70,9 @@ impl Observations {
         let mut poses: Vec<usize> = views.iter().map(|view| view.pose).collect();
         poses.sort_unstable();
         poses.dedup();
-        let typical_sigma_px = median_sigma_px(views);
+        // If no corner has a standard deviation of its own, nothing is asked of this one.
+        let corners = views.iter().flat_map(|view| &view.corners);
+        let typical_sigma_px = median(corners.filter_map(|c| c.sigma_px)).unwrap_or(1.0);
         let mut blocks: Vec<ViewBlock> = views
             .iter()
             .filter_map(|view| {
@@ -179,16 +182,6 @@ impl Observations {
         selected.sensors = vec![self.sensors[camera_idx]];
         selected
     }
-}
-
-/// Median of the corners' own standard deviations, px; 1 if none has one.
-fn median_sigma_px(views: &[View]) -> f64 {
-    let mut sigmas: Vec<f64> = views
-        .iter()
-        .flat_map(|view| view.corners.iter().filter_map(|corner| corner.sigma_px))
-        .collect();
-    sigmas.sort_by(f64::total_cmp);
-    sigmas.get(sigmas.len() / 2).copied().unwrap_or(1.0)
 }
 
 /// The values of the fixed functions at the corners of one view: base lens, Legendre products and

@@ -6,6 +6,7 @@
 
 use super::objective::Weights;
 use super::observations::Observations;
+use calib_rays::numerics::median;
 use nalgebra::Vector2;
 
 /// Degrees of freedom that are tried; the last is least squares to all practical purposes.
@@ -58,12 +59,9 @@ impl StudentT {
     pub fn fit(squared_px2: &[f64], floor_px2: f64, known: Option<&Self>) -> Self {
         let mut best: Option<(f64, Self)> = None;
         let robust_start = {
-            let mut values = squared_px2.to_vec();
-            let middle = values.len() / 2;
-            let median = (middle < values.len())
-                .then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1);
+            let median = median(squared_px2.iter().copied()).unwrap_or(0.0);
             // The median of |r|^2 of a bivariate Gaussian is 2 ln 2 times its variance per axis.
-            median.unwrap_or(0.0) / (2.0 * 2f64.ln())
+            median / (2.0 * 2f64.ln())
         }
         .max(floor_px2);
         let near = |freedom: f64| {

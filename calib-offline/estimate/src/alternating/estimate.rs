@@ -11,6 +11,7 @@ use crate::adjust::Observations;
 use crate::adjust::observations::ViewBlock;
 use crate::init::rig::RigStart;
 use calib_rays::geometry::{RigidTransform, nearest_point};
+use calib_rays::numerics::median;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -345,9 +346,7 @@ fn meeting_place(
     lattice: &[Option<super::rays::SupportedRay>],
 ) -> RigidTransform {
     let rays: Vec<_> = lattice.iter().flatten().map(|ray| ray.ray).collect();
-    let mut distances: Vec<f64> = lattice.iter().flatten().map(|ray| ray.near_mm).collect();
-    distances.sort_by(f64::total_cmp);
-    let Some(distance) = distances.get(distances.len() / 2) else {
+    let Some(distance) = median(lattice.iter().flatten().map(|ray| ray.near_mm)) else {
         return camera;
     };
     match nearest_point(&rays) {

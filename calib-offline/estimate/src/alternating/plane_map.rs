@@ -6,6 +6,7 @@ use crate::adjust::observations::ObservedCorner;
 use crate::init::bearing_pose::BoardHomography;
 use calib_rays::geometry::PixelPoint;
 use calib_rays::geometry::hull::{convex_hull, hull_contains};
+use calib_rays::numerics::median;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// Fewest corners that a network is trained on.
@@ -177,9 +178,7 @@ pub fn errors_mm(network: &BoardNetwork, corners: &[ObservedCorner]) -> Vec<f64>
 
 fn without_outliers(network: &BoardNetwork, corners: &[ObservedCorner]) -> Vec<ObservedCorner> {
     let errors = errors_mm(network, corners);
-    let mut sorted = errors.clone();
-    sorted.sort_by(f64::total_cmp);
-    let median = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    let median = median(errors.iter().copied()).unwrap_or(0.0);
     let limit = REJECT_BEYOND_SIGMA * (median / MEDIAN_LENGTH).max(FLOOR_MM);
     corners
         .iter()

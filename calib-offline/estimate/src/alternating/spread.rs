@@ -9,6 +9,7 @@
 
 use super::plane_map::{MIN_CORNERS, NetworkSettings, TrainingSet, errors_mm};
 use crate::adjust::observations::{ObservedCorner, ViewBlock};
+use calib_rays::numerics::median;
 use calib_rays::numerics::rms;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -84,19 +85,15 @@ pub fn choose(views: &[&ViewBlock], settings: &NetworkSettings) -> Option<Spread
 
 /// Median distance of a corner from the middle of its view, px.
 fn median_reach_px(views: &[&ViewBlock]) -> Option<f64> {
-    let mut reaches: Vec<f64> = views
-        .iter()
-        .flat_map(|view| {
-            let count = view.corners.len() as f64;
-            let sum = |of: fn(&ObservedCorner) -> f64| view.corners.iter().map(of).sum::<f64>();
-            let (u, v) = (sum(|c| c.pixel.u) / count, sum(|c| c.pixel.v) / count);
-            view.corners
-                .iter()
-                .map(move |c| (c.pixel.u - u).hypot(c.pixel.v - v))
-        })
-        .collect();
-    reaches.sort_by(f64::total_cmp);
-    reaches.get(reaches.len() / 2).copied().filter(|r| *r > 0.0)
+    let reaches = views.iter().flat_map(|view| {
+        let count = view.corners.len() as f64;
+        let sum = |of: fn(&ObservedCorner) -> f64| view.corners.iter().map(of).sum::<f64>();
+        let (u, v) = (sum(|c| c.pixel.u) / count, sum(|c| c.pixel.v) / count);
+        view.corners
+            .iter()
+            .map(move |c| (c.pixel.u - u).hypot(c.pixel.v - v))
+    });
+    median(reaches).filter(|r| *r > 0.0)
 }
 
 /// A view with its corners dealt to folds.

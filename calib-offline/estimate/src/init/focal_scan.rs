@@ -13,6 +13,7 @@ use calib_rays::board::BoardShape;
 use calib_rays::field::structured::StructuredBasis;
 use calib_rays::field::{BaseLens, Projection, RayField, transport};
 use calib_rays::geometry::{RigidTransform, SensorSize};
+use calib_rays::numerics::median;
 use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
 
@@ -180,7 +181,7 @@ fn try_lens(trial: &Observations, sensor: SensorSize, base: BaseLens) -> Option<
     Some(Candidate {
         base,
         poses,
-        score_px: median(&mut errors_px)?,
+        score_px: median(errors_px)?,
     })
 }
 
@@ -233,12 +234,9 @@ fn adjust_cubic(
         let (_, weights) = reweight(&residuals, observations, 1.0, None);
         model = levenberg::minimize(model, observations, &bases, &weights, &priors, settings).model;
     }
-    let mut lengths_px: Vec<f64> = objective::residuals(&model, observations, &bases)
-        .iter()
-        .flatten()
-        .map(|residual| residual.map_or(f64::INFINITY, |r| r.norm()))
-        .collect();
-    let median_px = median(&mut lengths_px)?;
+    let residuals = objective::residuals(&model, observations, &bases);
+    let lengths_px = residuals.iter().flatten();
+    let median_px = median(lengths_px.map(|r| r.map_or(f64::INFINITY, |r| r.norm())))?;
     median_px.is_finite().then_some((model, median_px))
 }
 
@@ -309,10 +307,4 @@ fn place_all(
             sensor,
         }),
     }
-}
-
-/// Median; `None` of nothing.
-fn median(values: &mut [f64]) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }

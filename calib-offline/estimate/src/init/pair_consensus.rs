@@ -12,6 +12,7 @@
 use super::view_fit::ViewFit;
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::{RigidTransform, so3};
+use calib_rays::numerics::median;
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 /// Median of a chi-square variable of 6 degrees of freedom.
@@ -85,16 +86,13 @@ pub fn consensus(board: &BoardSpec, pairs: &[Pair], limit_sigma: f64) -> Option<
     let asked: Vec<Pair> = thinned(pairs, MOST_ASKED);
     let median_misfit = |second_from_first: &RigidTransform| {
         let mut turned_count = 0;
-        let mut misfits: Vec<f64> = asked
-            .iter()
-            .map(|pair| {
-                let plain = pair.misfit_px2(second_from_first, None);
-                let turned = pair.misfit_px2(second_from_first, Some(&turn));
-                turned_count += usize::from(turned < plain);
-                plain.min(turned)
-            })
-            .collect();
-        (median(&mut misfits), 2 * turned_count > asked.len())
+        let misfit_px2 = median(asked.iter().map(|pair| {
+            let plain = pair.misfit_px2(second_from_first, None);
+            let turned = pair.misfit_px2(second_from_first, Some(&turn));
+            turned_count += usize::from(turned < plain);
+            plain.min(turned)
+        }));
+        (misfit_px2.unwrap_or(0.0), 2 * turned_count > asked.len())
     };
     // The best proposal under which most pairs count as numbered, and as turned.
     let mut best: [Option<(f64, RigidTransform)>; 2] = [None, None];
@@ -206,22 +204,16 @@ fn refine(
 ) -> Consensus {
     let mut transform = start;
     // Corner noise alone makes pairs disagree by this much, though few pairs may not show it.
-    let floor_px2 = median(
-        &mut pairs
-            .iter()
-            .map(Pair::corner_variance_px2)
-            .collect::<Vec<_>>(),
-    );
+    let floor_px2 = median(pairs.iter().map(Pair::corner_variance_px2)).unwrap_or(0.0);
     let turn_of = |pair: &Pair, transform: &RigidTransform| {
         let plain = pair.misfit_px2(transform, None);
         (pair.misfit_px2(transform, Some(turn)) < plain).then_some(turn)
     };
     let scale = |transform: &RigidTransform| {
-        let mut misfits: Vec<f64> = pairs
+        let misfits_px2 = pairs
             .iter()
-            .map(|pair| pair.misfit_px2(transform, turn_of(pair, transform)))
-            .collect();
-        (median(&mut misfits) / CHI_SQUARE_6_MEDIAN).max(floor_px2)
+            .map(|pair| pair.misfit_px2(transform, turn_of(pair, transform)));
+        (median(misfits_px2).unwrap_or(0.0) / CHI_SQUARE_6_MEDIAN).max(floor_px2)
     };
     for _ in 0..STEPS {
         let variance_px2 = scale(&transform);
@@ -269,7 +261,7 @@ fn refine(
     Consensus {
         second_from_first: transform,
         variance_px2,
-        typical_px: median(&mut readings.iter().map(|r| r.misfit_px).collect::<Vec<_>>()),
+        typical_px: median(readings.iter().map(|r| r.misfit_px)).unwrap_or(0.0),
         readings,
     }
 }
@@ -278,10 +270,4 @@ fn refine(
 fn thinned<'a>(pairs: &[Pair<'a>], most: usize) -> Vec<Pair<'a>> {
     let count = pairs.len().min(most);
     (0..count).map(|k| pairs[k * pairs.len() / count]).collect()
-}
-
-/// The upper median; 0 of nothing.
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }

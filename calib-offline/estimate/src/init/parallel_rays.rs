@@ -3,6 +3,7 @@
 use super::is_usable;
 use crate::adjust::Observations;
 use crate::adjust::observations::ViewBlock;
+use calib_rays::numerics::median;
 use nalgebra::{Matrix3, Matrix3x2, Vector3};
 
 /// Median length of the residual vectors, px, if every board is mapped to the image by the best
@@ -11,15 +12,8 @@ use nalgebra::{Matrix3, Matrix3x2, Vector3};
 /// An ordinary lens maps tilted boards with perspective and so leaves more than a field fitted to
 /// it; where affine maps leave less than the best field, there is no perspective to fit.
 pub fn affine_median_px(observations: &Observations) -> Option<f64> {
-    let mut lengths_px: Vec<f64> = observations
-        .views
-        .iter()
-        .filter(|view| is_usable(view))
-        .filter_map(affine_residuals_px)
-        .flatten()
-        .collect();
-    lengths_px.sort_by(f64::total_cmp);
-    lengths_px.get(lengths_px.len() / 2).copied()
+    let usable = observations.views.iter().filter(|view| is_usable(view));
+    median(usable.filter_map(affine_residuals_px).flatten())
 }
 
 fn affine_residuals_px(view: &ViewBlock) -> Option<Vec<f64>> {

@@ -20,6 +20,7 @@ use crate::adjust::observations::ViewBlock;
 use calib_rays::board::BoardShape;
 use calib_rays::field::RayField;
 use calib_rays::geometry::{RigidTransform, so3};
+use calib_rays::numerics::median;
 use rayon::prelude::*;
 
 /// A view is left out if the logarithm of its misfit is this many robust standard deviations above
@@ -138,8 +139,11 @@ fn leave_out_misfits(
             .filter(|(_, (view, _))| view.camera_idx == camera_idx)
             .filter_map(|(k, (_, fit))| Some((k, fit.as_ref()?.variance_px2().ln() / 2.0)))
             .collect();
-        let middle = median(logs.iter().map(|(_, log)| *log).collect());
-        let spread = 1.4826 * median(logs.iter().map(|(_, log)| (log - middle).abs()).collect());
+        let Some(middle) = median(logs.iter().map(|(_, log)| *log)) else {
+            continue;
+        };
+        let deviations = logs.iter().map(|(_, log)| (log - middle).abs());
+        let spread = 1.4826 * median(deviations).unwrap_or(0.0);
         let limit = middle + (MISFIT_SIGMA * spread).max(MISFIT_FACTOR.ln());
         let typical_px = middle.exp() * (2.0 * 2f64.ln()).sqrt();
         for (k, log) in logs {
@@ -412,10 +416,4 @@ impl Screening<'_> {
             findings: self.findings,
         }
     }
-}
-
-/// The upper median; 0 of nothing.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }

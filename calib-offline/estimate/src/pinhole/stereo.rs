@@ -10,6 +10,7 @@ use crate::adjust::observations::ViewBlock;
 use crate::init::InitError;
 use calib_rays::geometry::{RigidTransform, so3};
 use calib_rays::in_order;
+use calib_rays::numerics::median;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -178,9 +179,8 @@ fn middle(relative: &[RigidTransform]) -> Option<RigidTransform> {
     let rotations: Vec<_> = relative.iter().map(|pose| pose.rotation).collect();
     let rotation = so3::geodesic_median(&rotations)?;
     let translation_mm = Vector3::from_fn(|axis, _| {
-        let mut values: Vec<f64> = relative.iter().map(|p| p.translation_mm[axis]).collect();
-        values.sort_by(f64::total_cmp);
-        values[values.len() / 2]
+        // There is one, as there is a median of the rotations.
+        median(relative.iter().map(|p| p.translation_mm[axis])).unwrap_or(0.0)
     });
     Some(RigidTransform::new(rotation, translation_mm))
 }

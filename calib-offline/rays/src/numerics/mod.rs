@@ -10,4 +10,4 @@ pub mod singular_values;
 pub mod statistics;
 
 pub use singular_values::SingularValues;
-pub use statistics::rms;
+pub use statistics::{median, rms};

@@ -7,6 +7,7 @@
 
 use super::grid::{FittedGrid, Node};
 use crate::dataset::image::GrayImage;
+use calib_rays::numerics::median;
 
 /// Outward directions of the four sides.
 const OUTWARD: [Node; 4] = [(-1, 0), (1, 0), (0, -1), (0, 1)];
@@ -74,9 +75,8 @@ fn is_border(image: &GrayImage, grid: &FittedGrid, outward: Node) -> bool {
     if bright.len() < MIN_SQUARES || dark.len() < MIN_SQUARES {
         return false;
     }
-    let mut ends: Vec<f64> = dark.iter().filter_map(|p| p.end_of_dark()).collect();
-    ends.sort_unstable_by(f64::total_cmp);
-    let Some(&end) = ends.get(ends.len() / 2) else {
+    let ends: Vec<f64> = dark.iter().filter_map(|p| p.end_of_dark()).collect();
+    let Some(end) = median(ends.iter().copied()) else {
         return false;
     };
     let near_end = ends

@@ -7,7 +7,7 @@
 //! and to warn, never to estimate.
 
 use calib_rays::geometry::PixelPoint;
-use calib_rays::numerics::SingularValues;
+use calib_rays::numerics::{SingularValues, median};
 use nalgebra::{Matrix3, SMatrix, SVector, SymmetricEigen, Vector3};
 
 /// The same corner in a first and a second camera.
@@ -55,9 +55,7 @@ impl FundamentalMatrix {
 
     /// Median distance of the matches, px; `None` without matches.
     pub fn median_distance_px(&self, matches: &[Match]) -> Option<f64> {
-        let mut distances: Vec<f64> = matches.iter().map(|m| self.distance_px(m)).collect();
-        distances.sort_unstable_by(f64::total_cmp);
-        distances.get(distances.len() / 2).copied()
+        median(matches.iter().map(|m| self.distance_px(m)))
     }
 }
 

@@ -5,6 +5,7 @@ use super::corner_fit::{CornerGuess, FittedCorner, fit_corner};
 use crate::dataset::image::GrayImage;
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::PixelPoint;
+use calib_rays::numerics::median;
 use nalgebra::{Matrix2, Vector2};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -104,11 +105,7 @@ impl FittedGrid {
 
     /// Medians over the corners; `None` if there are none.
     pub fn typical(&self) -> Option<Typical> {
-        let median = |of: fn(&FittedCorner) -> f64| {
-            let mut values: Vec<f64> = self.corners.values().map(of).collect();
-            values.sort_unstable_by(f64::total_cmp);
-            values.get(values.len() / 2).copied()
-        };
+        let median = |of: fn(&FittedCorner) -> f64| median(self.corners.values().map(of));
         Some(Typical {
             amplitude: median(|c| c.amplitude.abs())?,
             blur_px: median(|c| c.blur_px)?,
@@ -125,13 +122,10 @@ impl FittedGrid {
     /// Shorter side of a square in the image, median over the corners, px.
     pub fn square_px(&self) -> Option<f64> {
         let pixels = self.pixels();
-        let mut sides: Vec<f64> = pixels
+        let squares = pixels
             .keys()
-            .filter_map(|&node| px_from_square(&pixels, node))
-            .map(|m| shorter_side(&m))
-            .collect();
-        sides.sort_unstable_by(f64::total_cmp);
-        sides.get(sides.len() / 2).copied()
+            .filter_map(|&node| px_from_square(&pixels, node));
+        median(squares.map(|m| shorter_side(&m)))
     }
 
     /// The corners' places alone.

@@ -9,10 +9,11 @@ use super::perspective::edge_offsets;
 use super::placement::{Sized, Verdict, place};
 use super::ring_fit::{FittedRing, shape_of_circle};
 use super::ring_model::EdgeOffsets;
-use super::verdict::{TargetRefusal, median};
+use super::verdict::TargetRefusal;
 use crate::dataset::TargetSpec;
 use crate::dataset::image::GrayImage;
 use calib_rays::geometry::PixelPoint;
+use calib_rays::numerics::median;
 use nalgebra::Vector2;
 use std::collections::BTreeMap;
 

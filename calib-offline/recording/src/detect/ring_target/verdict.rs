@@ -5,6 +5,7 @@ use super::ring_fit::FittedRing;
 use crate::dataset::TargetSpec;
 use crate::dataset::image::GrayImage;
 use crate::detect::verdict::{EDGE_WIDTH_OF_BLUR, Refusal, why_nothing_found};
+use calib_rays::numerics::median;
 use std::path::PathBuf;
 
 /// The verdict on one image of the target.
@@ -168,11 +169,4 @@ impl TargetFigures {
             )?,
         })
     }
-}
-
-/// The middle one of numbers; the upper of two.
-pub(super) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
