@@ -1,37 +1,31 @@
 //! Least squares whose unknowns meet only near ones: banded normal equations.
 
-use super::product::dot;
+use super::banded::BandedMatrix;
+use super::cholesky::BandedCholesky;
+
+/// Number of right-hand sides.
+const CHANNELS: usize = 4;
 
 /// Symmetric banded normal equations with four right-hand sides.
 pub struct BandedSystem {
-    half_bandwidth: usize,
-    /// Row k holds the entries of columns `k - half_bandwidth ..= k`.
-    lower: Vec<f64>,
-    right: Vec<[f64; 4]>,
+    normal: BandedMatrix,
+    right: Vec<[f64; CHANNELS]>,
 }
 
 impl BandedSystem {
     /// A system of `size` unknowns; entries further than `half_bandwidth` from the diagonal are zero.
     pub fn new(size: usize, half_bandwidth: usize) -> Self {
         Self {
-            half_bandwidth,
-            lower: vec![0.0; size * (half_bandwidth + 1)],
-            right: vec![[0.0; 4]; size],
+            normal: BandedMatrix::zeros(size, half_bandwidth),
+            right: vec![[0.0; CHANNELS]; size],
         }
     }
 
-    /// Adds to the entry (row, column), or to its mirror image.
-    fn add(&mut self, a: usize, b: usize, value: f64) {
-        let (row, column) = (a.max(b), a.min(b));
-        let width = self.half_bandwidth + 1;
-        self.lower[row * width + self.half_bandwidth - (row - column)] += value;
-    }
-
     /// Adds the squared weighted sum of some unknowns, minus `value` for each right-hand side.
-    pub fn add_square(&mut self, terms: &[(usize, f64)], value: [f64; 4], weight: f64) {
+    pub fn add_square(&mut self, terms: &[(usize, f64)], value: [f64; CHANNELS], weight: f64) {
         for (k, &(a, wa)) in terms.iter().enumerate() {
             for &(b, wb) in &terms[..=k] {
-                self.add(a, b, weight * wa * wb);
+                self.normal.add(a.max(b), a.min(b), weight * wa * wb);
             }
             for (sum, channel) in self.right[a].iter_mut().zip(value) {
                 *sum += weight * wa * channel;
@@ -39,53 +33,12 @@ impl BandedSystem {
         }
     }
 
-    /// Cholesky factorization and both substitutions; `None` if the matrix is not positive
-    /// definite.
-    pub fn solve(mut self) -> Option<Vec<[f64; 4]>> {
-        let (p, width) = (self.half_bandwidth, self.half_bandwidth + 1);
-        for row in 0..self.right.len() {
-            let first = row.saturating_sub(p);
-            let (above, this) = self.lower.split_at_mut(row * width);
-            for column in first..row {
-                let other = &above[column * width..(column + 1) * width];
-                // Entries of both rows in the columns first .. column.
-                let count = column - first;
-                let start_this = p - (row - first);
-                let start_other = p - count;
-                let sum: f64 = dot(
-                    &this[start_this..start_this + count],
-                    &other[start_other..start_other + count],
-                );
-                let place = p - (row - column);
-                this[place] = (this[place] - sum) / other[p];
-            }
-            let start = p - (row - first);
-            let pivot = this[p] - dot(&this[start..p], &this[start..p]);
-            if !(pivot > 0.0 && pivot.is_finite()) {
-                return None;
-            }
-            this[p] = pivot.sqrt();
-        }
-        for row in 0..self.right.len() {
-            let entries = &self.lower[row * width..(row + 1) * width];
-            for column in row.saturating_sub(p)..row {
-                let factor = entries[p - (row - column)];
-                for channel in 0..4 {
-                    self.right[row][channel] -= factor * self.right[column][channel];
-                }
-            }
-            self.right[row].iter_mut().for_each(|x| *x /= entries[p]);
-        }
-        for row in (0..self.right.len()).rev() {
-            let entries = &self.lower[row * width..(row + 1) * width];
-            self.right[row].iter_mut().for_each(|x| *x /= entries[p]);
-            for column in row.saturating_sub(p)..row {
-                let factor = entries[p - (row - column)];
-                for channel in 0..4 {
-                    self.right[column][channel] -= factor * self.right[row][channel];
-                }
-            }
-        }
+    /// The unknowns per right-hand side; `None` if the matrix is not positive definite.
+    pub fn solve(mut self) -> Option<Vec<[f64; CHANNELS]>> {
+        let factor = BandedCholesky::of_banded(&self.normal, 1.0)?;
+        let columns = self.right.as_flattened_mut();
+        factor.solve_lower(columns, &[0; CHANNELS]);
+        factor.solve_upper(columns, CHANNELS);
         Some(self.right)
     }
 }
