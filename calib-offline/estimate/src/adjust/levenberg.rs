@@ -1,10 +1,11 @@
-//! Levenberg-Marquardt on the blocked normal equations, weights and priors held fixed.
+//! The adjustment as a problem of Levenberg-Marquardt, weights and priors held fixed.
 
 use super::equations::normal_equations::NormalEquations;
-use super::model::Model;
+use super::model::{Layout, Model, Step};
 use super::objective::{Weights, cost};
 use super::observations::{Observations, ViewBasis};
 use super::priors::Priors;
+use calib_rays::numerics::levenberg::{self, Problem, StopReason, Tried};
 
 /// When to stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,27 +25,20 @@ impl Default for Settings {
     }
 }
 
-/// Why the iteration ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StopReason {
-    /// A further step would change next to nothing.
-    Converged,
-    /// The allowed number of iterations is used up.
-    IterationLimit,
-    /// No step, however short, lowers the objective any more.
-    NoFurtherDecrease,
-    /// The equations are singular: something is not determined by the data.
-    Singular,
-}
-
-impl std::fmt::Display for StopReason {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Converged => "converged: a further step would change next to nothing",
-            Self::IterationLimit => "stopped at the iteration limit",
-            Self::NoFurtherDecrease => "stopped: no step lowers the cost any more",
-            Self::Singular => "stopped: the data do not determine some parameter",
-        })
+impl Settings {
+    fn of_search(&self) -> levenberg::Settings {
+        levenberg::Settings {
+            max_linearizations: self.max_iterations,
+            max_steps: usize::MAX,
+            first_damping: 1e-4,
+            least_damping: 1e-12,
+            most_damping: 1e8,
+            growth: 10.0,
+            growth_from: 1e-8,
+            singular_damping: 1.0,
+            least_after_singular: 1e-6,
+            accepts_equal: false,
+        }
     }
 }
 
@@ -59,10 +53,56 @@ pub struct Outcome {
     pub stop: StopReason,
 }
 
-/// Damping of the first step, and the least there is: at that level a step is Gauss-Newton's.
-const FIRST_DAMPING: f64 = 1e-4;
-const LEAST_DAMPING: f64 = 1e-12;
-const MOST_DAMPING: f64 = 1e8;
+struct Adjustment<'a> {
+    layout: Layout,
+    observations: &'a Observations,
+    bases: &'a [ViewBasis],
+    weights: &'a Weights,
+    priors: &'a Priors,
+    relative_decrease: f64,
+}
+
+impl Problem for Adjustment<'_> {
+    type State = Model;
+    type Equations = NormalEquations;
+    type Step = Step;
+
+    fn cost(&self, model: &Model) -> f64 {
+        cost(
+            model,
+            self.observations,
+            self.bases,
+            self.weights,
+            self.priors,
+        )
+    }
+
+    fn linearize(&self, model: &Model) -> Option<NormalEquations> {
+        Some(NormalEquations::assemble(
+            model,
+            &self.layout,
+            self.observations,
+            self.bases,
+            self.weights,
+            self.priors,
+        ))
+    }
+
+    fn step(&self, equations: &NormalEquations, damping: f64) -> Option<Step> {
+        Some(equations.step(&equations.reduce(damping)?))
+    }
+
+    fn moved(&self, model: &Model, step: &Step) -> Option<Model> {
+        Some(model.stepped(&self.layout, step))
+    }
+
+    fn is_settled(&self, tried: &Tried<Self>) -> bool {
+        let promised = tried
+            .equations
+            .predicted_decrease(tried.step, tried.damping);
+        promised <= self.relative_decrease * tried.cost
+    }
+}
 
 /// Lowers the objective from a starting model.
 pub fn minimize(
@@ -73,55 +113,25 @@ pub fn minimize(
     priors: &Priors,
     settings: Settings,
 ) -> Outcome {
-    let layout = start.layout();
-    let mut model = start;
-    let mut current = cost(&model, observations, bases, weights, priors);
-    let mut costs = vec![current];
-    let mut damping = FIRST_DAMPING;
-    let mut stop = StopReason::IterationLimit;
-    'iterations: for _ in 0..settings.max_iterations {
-        let equations =
-            NormalEquations::assemble(&model, &layout, observations, bases, weights, priors);
-        loop {
-            if damping > MOST_DAMPING {
-                stop = StopReason::NoFurtherDecrease;
-                break 'iterations;
-            }
-            let Some(reduced) = equations.reduce(damping) else {
-                if damping >= 1.0 {
-                    stop = StopReason::Singular;
-                    break 'iterations;
-                }
-                damping = (damping * 100.0).max(1e-6);
-                continue;
-            };
-            let step = equations.step(&reduced);
-            let promised = equations.predicted_decrease(&step, damping);
-            let stepped = model.stepped(&layout, &step);
-            let reached = cost(&stepped, observations, bases, weights, priors);
-            let settled = promised <= settings.relative_decrease * current;
-            let accepted = reached < current;
-            if accepted {
-                model = stepped;
-                current = reached;
-                costs.push(current);
-                damping = (damping / 10.0).max(LEAST_DAMPING);
-            }
-            if settled {
-                stop = StopReason::Converged;
-                break 'iterations;
-            }
-            if accepted {
-                break;
-            }
-            damping = damping.max(1e-8) * 10.0;
-        }
-    }
+    let adjustment = Adjustment {
+        layout: start.layout(),
+        observations,
+        bases,
+        weights,
+        priors,
+        relative_decrease: settings.relative_decrease,
+    };
+    let outcome = levenberg::minimize(&adjustment, start, &settings.of_search());
+    let mut model = outcome.state;
     for pose in &mut model.rig_from_board {
         *pose = pose.orthonormalized();
     }
     for camera in &mut model.cameras {
         camera.camera_from_rig = camera.camera_from_rig.orthonormalized();
     }
-    Outcome { model, costs, stop }
+    Outcome {
+        model,
+        costs: outcome.costs,
+        stop: outcome.stop,
+    }
 }

@@ -19,6 +19,7 @@ pub mod robust;
 #[cfg(test)]
 mod tests;
 
-pub use levenberg::{Outcome, StopReason};
+pub use calib_rays::numerics::levenberg::StopReason;
+pub use levenberg::Outcome;
 pub use model::{CameraModel, Model};
 pub use observations::Observations;

@@ -5,13 +5,13 @@ use super::error::EstimateError;
 use super::evidence::Smoothness;
 use crate::adjust::equations::normal_equations::NormalEquations;
 use crate::adjust::equations::reduced::Reduced;
-use crate::adjust::levenberg::{self, Settings, StopReason};
+use crate::adjust::levenberg::{self, Settings};
 use crate::adjust::model::Layout;
 use crate::adjust::objective::{self, Weights};
 use crate::adjust::observations::ViewBasis;
 use crate::adjust::priors::Priors;
 use crate::adjust::robust::{StudentT, reweight};
-use crate::adjust::{Model, Observations};
+use crate::adjust::{Model, Observations, StopReason};
 use nalgebra::Vector2;
 
 /// Standard deviation of each coefficient of the board's shape before anything is seen, mm.

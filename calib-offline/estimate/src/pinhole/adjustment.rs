@@ -6,17 +6,15 @@ use super::brown::INTRINSICS;
 use super::reprojection::{
     assemble, check_start, columns, cost, residuals, shared_count, stepped, taking_part,
 };
+use crate::adjust::Observations;
 use crate::adjust::objective::Weights;
 use crate::adjust::robust::{StudentT, reweight};
-use crate::adjust::{Observations, StopReason};
+use calib_rays::numerics::arrowhead::{Arrowhead, Step};
+use calib_rays::numerics::levenberg::{self, Problem, StopReason, Tried};
 use serde::{Deserialize, Serialize};
 
 pub use super::reprojection::{Free, State};
 
-/// Damping of the first step, the least there is, and the most before giving up.
-const FIRST_DAMPING: f64 = 1e-3;
-const LEAST_DAMPING: f64 = 1e-14;
-const MOST_DAMPING: f64 = 1e12;
 /// Rounds of re-weighting.
 const ROBUST_ROUNDS: usize = 10;
 /// A change of the residuals' variance by less than this share ends them.
@@ -50,6 +48,23 @@ impl Default for Settings {
             loss: Loss::LeastSquares,
             max_iterations: 200,
             relative_decrease: 1e-12,
+        }
+    }
+}
+
+impl Settings {
+    fn of_search(&self) -> levenberg::Settings {
+        levenberg::Settings {
+            max_linearizations: self.max_iterations,
+            max_steps: usize::MAX,
+            first_damping: 1e-3,
+            least_damping: 1e-14,
+            most_damping: 1e12,
+            growth: 10.0,
+            growth_from: 1e-8,
+            singular_damping: 1.0,
+            least_after_singular: 1e-8,
+            accepts_equal: false,
         }
     }
 }
@@ -93,18 +108,18 @@ pub struct CameraDeviations {
 /// # Errors
 /// [`PinholeError::BehindCamera`] if the start has boards behind a camera.
 pub fn minimize(
-    mut state: State,
+    start: State,
     observations: &Observations,
     free: Free,
     settings: &Settings,
 ) -> Result<Outcome, PinholeError> {
-    check_start(&state, observations)?;
+    check_start(&start, observations)?;
     let plain: Weights = observations
         .views
         .iter()
         .map(|view| view.corners.iter().map(|c| c.relative_weight).collect())
         .collect();
-    let mut run = descend(&mut state, observations, &plain, free, settings);
+    let (mut state, mut run) = descend(start, observations, &plain, free, settings);
     let mut weights = plain;
     let mut noise_found = None;
     if settings.loss == Loss::StudentT {
@@ -115,7 +130,8 @@ pub fn minimize(
                 (noise.variance_px2 / known.variance_px2).ln().abs()
             });
             weights = next;
-            let again = descend(&mut state, observations, &weights, free, settings);
+            let (next, again) = descend(state, observations, &weights, free, settings);
+            state = next;
             run = Run {
                 iterations: run.iterations + again.iterations,
                 ..again
@@ -139,55 +155,60 @@ struct Run {
     stop: StopReason,
 }
 
-/// Levenberg-Marquardt with weights held fixed.
+/// The cameras as a problem of Levenberg-Marquardt, weights held fixed.
+struct Reprojection<'a> {
+    observations: &'a Observations,
+    weights: &'a Weights,
+    free: Free,
+    relative_decrease: f64,
+}
+
+impl Problem for Reprojection<'_> {
+    type State = State;
+    type Equations = Arrowhead;
+    type Step = Step;
+
+    fn cost(&self, state: &State) -> f64 {
+        cost(state, self.observations, self.weights)
+    }
+
+    fn linearize(&self, state: &State) -> Option<Arrowhead> {
+        Some(assemble(state, self.observations, self.weights, self.free))
+    }
+
+    fn step(&self, equations: &Arrowhead, damping: f64) -> Option<Step> {
+        equations.step(damping)
+    }
+
+    fn moved(&self, state: &State, step: &Step) -> Option<State> {
+        Some(stepped(state, self.free, step))
+    }
+
+    fn is_settled(&self, tried: &Tried<Self>) -> bool {
+        tried.step.promised <= self.relative_decrease * tried.cost
+    }
+}
+
+/// Lowers the cost with weights held fixed.
 fn descend(
-    state: &mut State,
+    state: State,
     observations: &Observations,
     weights: &Weights,
     free: Free,
     settings: &Settings,
-) -> Run {
-    let mut current = cost(state, observations, weights);
-    let mut damping = FIRST_DAMPING;
-    for iteration in 0..settings.max_iterations {
-        let stopped = |stop| Run {
-            iterations: iteration + 1,
-            stop,
-        };
-        let equations = assemble(state, observations, weights, free);
-        loop {
-            if damping > MOST_DAMPING {
-                return stopped(StopReason::NoFurtherDecrease);
-            }
-            let Some(step) = equations.step(damping) else {
-                if damping >= 1.0 {
-                    return stopped(StopReason::Singular);
-                }
-                damping = (damping * 100.0).max(1e-8);
-                continue;
-            };
-            let stepped = stepped(state, free, &step);
-            let reached = cost(&stepped, observations, weights);
-            let is_settled = step.promised <= settings.relative_decrease * current;
-            let is_lower = reached < current;
-            if is_lower {
-                *state = stepped;
-                current = reached;
-                damping = (damping / 10.0).max(LEAST_DAMPING);
-            }
-            if is_settled {
-                return stopped(StopReason::Converged);
-            }
-            if is_lower {
-                break;
-            }
-            damping = damping.max(1e-8) * 10.0;
-        }
-    }
-    Run {
-        iterations: settings.max_iterations,
-        stop: StopReason::IterationLimit,
-    }
+) -> (State, Run) {
+    let problem = Reprojection {
+        observations,
+        weights,
+        free,
+        relative_decrease: settings.relative_decrease,
+    };
+    let outcome = levenberg::minimize(&problem, state, &settings.of_search());
+    let run = Run {
+        iterations: outcome.linearizations,
+        stop: outcome.stop,
+    };
+    (outcome.state, run)
 }
 
 fn orthonormalize(state: &mut State) {

@@ -5,10 +5,11 @@ use super::adjustment::{Free, Outcome, Settings, State, minimize};
 use super::brown::{BrownCamera, INTRINSICS};
 use super::homography::PixelHomography;
 use super::zhang::{ZhangForm, zhang};
-use crate::adjust::{Observations, StopReason};
+use crate::adjust::Observations;
 use crate::init::focal_scan::start_camera;
 use crate::init::{InitError, MIN_POSES};
 use calib_rays::geometry::{RigidTransform, SensorSize};
+use calib_rays::numerics::levenberg::StopReason;
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 

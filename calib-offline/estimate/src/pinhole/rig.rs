@@ -3,9 +3,9 @@
 use super::adjustment::CameraDeviations;
 use super::brown::BrownCamera;
 use super::calibrate_camera::CameraFit;
-use crate::adjust::StopReason;
 use calib_rays::field::rig::MeasureError;
 use calib_rays::geometry::{PixelPoint, Ray, RigidTransform, Triangulation, triangulate_rays};
+use calib_rays::numerics::levenberg::StopReason;
 
 /// Calibrated cameras in the frame of the first.
 #[derive(Debug, Clone)]

@@ -1,13 +1,13 @@
 //! The baseline on simulated corners.
 
 use super::adjustment::{Loss, Settings};
-use super::{PinholeError, PinholeRig, Refine, RigSettings};
-use super::{calibrate_camera, calibrate_rig};
-use crate::adjust::{Observations, StopReason};
+use super::{PinholeError, PinholeRig, Refine, RigSettings, calibrate_camera, calibrate_rig};
+use crate::adjust::Observations;
 use crate::init::InitError;
 use crate::reprojection::residuals;
 use calib_rays::board::BoardShape;
 use calib_rays::geometry::{RigidTransform, so3};
+use calib_rays::numerics::levenberg::StopReason;
 use calib_simulate::optics::{Distortion, Lens};
 use calib_simulate::{CameraOptics, OpticsKind, Scene, SceneSettings};
 

@@ -8,14 +8,27 @@
 use super::base_lens::{BaseLens, RADIAL_TERMS};
 use super::transport;
 use crate::geometry::so3;
+use crate::numerics::levenberg::{self, Problem, StopReason, Tried};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
 
 /// Focal length, center, radial coefficients, turn.
 const PARAMETERS: usize = 3 + RADIAL_TERMS + 3;
 type Parameters = SVector<f64, PARAMETERS>;
 
-/// Steps of the fit, at most.
-const STEPS: usize = 20;
+/// At most 20 steps; the start is near and the priors hold what the data leave open, so that
+/// singular equations are no use.
+const SEARCH: levenberg::Settings = levenberg::Settings {
+    max_linearizations: usize::MAX,
+    max_steps: 20,
+    first_damping: 1e-6,
+    least_damping: 0.0,
+    most_damping: f64::INFINITY,
+    growth: 100.0,
+    growth_from: 0.0,
+    singular_damping: 0.0,
+    least_after_singular: 0.0,
+    accepts_equal: false,
+};
 /// A step that lowers the objective by a smaller share ends the fit.
 const LEAST_GAIN: f64 = 1e-6;
 /// Standard deviations of the parameters' changes before anything is seen: logarithm of the focal
@@ -52,27 +65,15 @@ pub fn nearest_lens(
         reach_px,
         seen,
     };
-    let mut at = Parameters::zeros();
-    let mut cost = fit.cost(&at)?;
-    let first = cost;
-    let mut damping = 1e-6;
-    for _ in 0..STEPS {
-        let (normal, gradient) = fit.equations(&at)?;
-        let damped = normal + SMatrix::from_diagonal(&(normal.diagonal() * damping));
-        let next = at - damped.cholesky()?.solve(&gradient);
-        match fit.cost(&next) {
-            Some(less) if less < cost => {
-                let gain = (cost - less) / cost;
-                (at, cost) = (next, less);
-                damping *= 0.1;
-                if gain < LEAST_GAIN {
-                    break;
-                }
-            }
-            _ => damping *= 100.0,
-        }
+    let start = Parameters::zeros();
+    fit.cost_of(&start)?;
+    let outcome = levenberg::minimize(&fit, start, &SEARCH);
+    if matches!(outcome.stop, StopReason::Singular | StopReason::Undefined) {
+        return None;
     }
-    (cost < first).then(|| (fit.lens(&at), turn(&at)))
+    let at = outcome.state;
+    let is_better = outcome.costs.len() > 1;
+    is_better.then(|| (fit.lens(&at), turn(&at)))
 }
 
 /// The turn of the camera frame.
@@ -121,18 +122,27 @@ impl LensFit<'_> {
             .collect()
     }
 
-    fn cost(&self, at: &Parameters) -> Option<f64> {
+    /// `None` where a direction cannot be seen or the cost has no bounds.
+    fn cost_of(&self, at: &Parameters) -> Option<f64> {
         let sum: f64 = self.residuals(at)?.iter().map(Vector2::norm_squared).sum();
         let prior: f64 = (0..PARAMETERS)
             .map(|k| PRIOR_SHARE * (at[k] / PRIOR_SD[k]).powi(2))
             .sum();
         (sum + prior).is_finite().then_some(sum + prior)
     }
+}
 
-    fn equations(
-        &self,
-        at: &Parameters,
-    ) -> Option<(SMatrix<f64, PARAMETERS, PARAMETERS>, Parameters)> {
+impl Problem for LensFit<'_> {
+    type State = Parameters;
+    /// The normal matrix and the gradient.
+    type Equations = (SMatrix<f64, PARAMETERS, PARAMETERS>, Parameters);
+    type Step = Parameters;
+
+    fn cost(&self, at: &Parameters) -> f64 {
+        self.cost_of(at).unwrap_or(f64::INFINITY)
+    }
+
+    fn linearize(&self, at: &Parameters) -> Option<Self::Equations> {
         const STEP: f64 = 1e-6;
         let here = self.residuals(at)?;
         let columns: Vec<Vec<Vector2<f64>>> = (0..PARAMETERS)
@@ -159,6 +169,20 @@ impl LensFit<'_> {
             gradient[k] += PRIOR_SHARE * at[k] / (sd * sd);
         }
         Some((normal, gradient))
+    }
+
+    fn step(&self, (normal, gradient): &Self::Equations, damping: f64) -> Option<Parameters> {
+        let damped = normal + SMatrix::from_diagonal(&(normal.diagonal() * damping));
+        Some(-damped.cholesky()?.solve(gradient))
+    }
+
+    fn moved(&self, at: &Parameters, step: &Parameters) -> Option<Parameters> {
+        Some(at + step)
+    }
+
+    fn is_settled(&self, tried: &Tried<Self>) -> bool {
+        let gain = (tried.cost - tried.reached) / tried.cost;
+        tried.reached < tried.cost && gain < LEAST_GAIN
     }
 }
 

@@ -4,6 +4,7 @@ pub mod arrowhead;
 pub mod banded;
 pub mod banded_system;
 pub mod cholesky;
+pub mod levenberg;
 pub mod pivoted_qr;
 pub mod product;
 pub mod singular_values;
