@@ -2,9 +2,9 @@
 //! refuses the difficult part of the image would else look the better for it.
 
 use crate::evaluate::held_out::{BoardErrors, Fold, measure_boards};
-use crate::evaluate::resection::residuals_with_free_pose;
 use calib_estimate::adjust::Observations;
 use calib_estimate::adjust::observations::{ObservedCorner, ViewBlock};
+use calib_estimate::init::board_pose::residuals_with_free_pose;
 use calib_rays::field::Rig;
 use calib_rays::geometry::PixelPoint;
 use calib_rays::measure::RigSource;

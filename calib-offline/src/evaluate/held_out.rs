@@ -5,9 +5,9 @@
 //! into points ([`measure_boards`]), be it the f64 rig or a blob in the device's own code.
 
 use super::measured_board::MeasuredBoard;
-use super::resection::residuals_with_free_pose;
 use calib_estimate::adjust::Observations;
 use calib_estimate::adjust::observations::ViewBlock;
+use calib_estimate::init::board_pose::residuals_with_free_pose;
 use calib_rays::board::BoardShape;
 use calib_rays::field::Rig;
 use calib_rays::geometry::PixelPoint;

@@ -8,7 +8,6 @@ pub mod half_data;
 pub mod held_out;
 pub mod known_points;
 pub mod measured_board;
-pub mod resection;
 pub mod stage_axis;
 
 pub mod verdict;

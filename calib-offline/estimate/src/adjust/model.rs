@@ -185,10 +185,7 @@ impl Model {
             }
         }
         for (pose, change) in next.rig_from_board.iter_mut().zip(&step.poses) {
-            *pose = pose.perturbed(
-                &change.fixed_rows::<3>(0).into_owned(),
-                &change.fixed_rows::<3>(3).into_owned(),
-            );
+            *pose = pose.stepped(change);
         }
         let board = step.global.rows_range(layout.board.clone());
         for (term, change) in next.board_shape.terms.iter_mut().zip(board.iter()) {

@@ -9,25 +9,15 @@
 //! that cannot be what they claim are found ([`screening`]).
 
 pub mod bearing_pose;
+pub mod board_pose;
 mod error;
 pub mod focal_scan;
 pub mod pair_consensus;
 mod parallel_rays;
 pub mod rig;
 pub mod screening;
-pub mod view_fit;
+mod usable;
 
 pub use calib_rays::observed::MIN_POSES;
 pub use error::InitError;
-
-use crate::adjust::observations::ViewBlock;
-use bearing_pose::is_collinear;
-
-/// Fewest corners that place a board.
-pub const MIN_CORNERS: usize = 6;
-
-/// Whether the view alone can place its board.
-pub fn is_usable(view: &ViewBlock) -> bool {
-    let points: Vec<_> = view.corners.iter().map(|c| c.point_in_board).collect();
-    points.len() >= MIN_CORNERS && !is_collinear(&points)
-}
+pub use usable::{MIN_CORNERS, is_usable};

@@ -9,7 +9,7 @@
 //! stage comes on top and is alike for all pairs. So the scale is that of the middle pair, and up
 //! to half of all pairs may be wrong (least median of squares, a relative of RANSAC; METHOD section 3).
 
-use super::view_fit::ViewFit;
+use super::board_pose::ViewFit;
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::{RigidTransform, so3};
 use calib_rays::numerics::median;
@@ -242,12 +242,7 @@ fn refine(
             break;
         };
         let step = factor.solve(&right);
-        transform = transform
-            .perturbed(
-                &step.fixed_rows::<3>(0).into_owned(),
-                &step.fixed_rows::<3>(3).into_owned(),
-            )
-            .orthonormalized();
+        transform = transform.stepped(&step).orthonormalized();
         if step.dot(&(normal * step)) < 1e-9 * variance_px2 {
             break;
         }

@@ -13,8 +13,8 @@
 //! Nothing is done silently: every change is a [`Finding`].
 
 use super::InitError;
+use super::board_pose::{ViewFit, fit_view};
 use super::pair_consensus::{Consensus, Pair, Reading, consensus, half_turn};
-use super::view_fit::{ViewFit, fit_view};
 use crate::adjust::Observations;
 use crate::adjust::observations::ViewBlock;
 use calib_rays::board::BoardShape;

@@ -5,10 +5,9 @@ use super::brown::{BrownCamera, INTRINSICS};
 use crate::adjust::Observations;
 use crate::adjust::objective::Weights;
 use crate::adjust::observations::ViewBlock;
-use calib_rays::geometry::so3::skew;
 use calib_rays::geometry::{PixelPoint, RigidTransform};
 use calib_rays::numerics::arrowhead::{Arrowhead, Step};
-use nalgebra::{DMatrix, Vector2, Vector3};
+use nalgebra::{DMatrix, Vector2, Vector6};
 
 /// Cameras, where they stand, and where the boards are.
 #[derive(Debug, Clone)]
@@ -207,9 +206,9 @@ fn products(
             continue;
         };
         let residual = difference(seen.pixel, corner.pixel);
-        let by_turn = -seen.by_point * skew(&carried);
+        let by_place = RigidTransform::by_step(&seen.by_point, &carried);
         let by_first = seen.by_point * camera_from_first.rotation;
-        let by_first_turn = -by_first * skew(&turned);
+        let by_pose = RigidTransform::by_step(&by_first, &turned);
         let root = weight.sqrt();
         for axis in 0..2 {
             let mut column = transposed.column_mut(2 * k + axis);
@@ -217,13 +216,11 @@ fn products(
                 column[row] = root
                     * match own.checked_sub(INTRINSICS) {
                         None => seen.by_intrinsics[(axis, *own)],
-                        Some(place @ 0..3) => by_turn[(axis, place)],
-                        Some(place) => seen.by_point[(axis, place - 3)],
+                        Some(place) => by_place[(axis, place)],
                     };
             }
-            for place in 0..3 {
-                column[shared + place] = root * by_first_turn[(axis, place)];
-                column[shared + 3 + place] = root * by_first[(axis, place)];
+            for place in 0..6 {
+                column[shared + place] = root * by_pose[(axis, place)];
             }
             column[shared + 6] = root * residual[axis];
         }
@@ -237,7 +234,7 @@ pub(super) fn stepped(state: &State, free: Free, step: &Step) -> State {
     let mut next = state.clone();
     for (idx, camera) in next.cameras.iter_mut().enumerate() {
         let mut values = camera.intrinsics();
-        let mut place = [0.0; 6];
+        let mut place = Vector6::zeros();
         for (own, at) in columns(free, idx) {
             if own < INTRINSICS {
                 values[own] += step.shared[at];
@@ -246,16 +243,12 @@ pub(super) fn stepped(state: &State, free: Free, step: &Step) -> State {
             }
         }
         *camera = camera.with_intrinsics(values);
-        let [a, b, c, x, y, z] = place;
         let moved = &mut next.camera_from_first[idx];
-        *moved = moved.perturbed(&Vector3::new(a, b, c), &Vector3::new(x, y, z));
+        *moved = moved.stepped(&place);
     }
     for (pose, change) in next.first_from_board.iter_mut().zip(&step.poses) {
         if let Some(pose) = pose {
-            *pose = pose.perturbed(
-                &change.fixed_rows::<3>(0).into_owned(),
-                &change.fixed_rows::<3>(3).into_owned(),
-            );
+            *pose = pose.stepped(change);
         }
     }
     next

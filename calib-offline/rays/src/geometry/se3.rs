@@ -1,7 +1,7 @@
 //! Rigid transforms between two named frames.
 
 use super::so3;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix2x3, Matrix2x6, Matrix3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 /// `point_in_a = rotation * point_in_b + translation_mm`; a variable of this type is named
@@ -52,6 +52,23 @@ impl RigidTransform {
             so3::exp(phi_rad) * self.rotation,
             self.translation_mm + tau_mm,
         )
+    }
+
+    /// [`Self::perturbed`] by rotation vector and translation in one.
+    pub fn stepped(&self, change: &Vector6<f64>) -> Self {
+        let [a, b, c, x, y, z] = (*change).into();
+        self.perturbed(&Vector3::new(a, b, c), &Vector3::new(x, y, z))
+    }
+
+    /// The derivative by the change of [`Self::stepped`] of what has the derivative `by_point` by a
+    /// point in frame a, mm; `turned` is that point without the translation.
+    #[inline]
+    pub fn by_step(by_point: &Matrix2x3<f64>, turned: &Vector3<f64>) -> Matrix2x6<f64> {
+        let by_turn = -by_point * so3::skew(turned);
+        Matrix2x6::from_fn(|axis, k| match k {
+            0..3 => by_turn[(axis, k)],
+            _ => by_point[(axis, k - 3)],
+        })
     }
 
     /// The same transform with its rotation made orthonormal to round-off.

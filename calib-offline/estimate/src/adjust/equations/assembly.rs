@@ -14,7 +14,7 @@ use crate::adjust::prediction::{Seen, predict};
 use crate::adjust::residual::Linearization;
 use calib_rays::field::knot_order::KnotOrder;
 use calib_rays::field::spline::AxisWeights;
-use calib_rays::geometry::so3::skew;
+use calib_rays::geometry::RigidTransform;
 use calib_rays::numerics::banded::BandedMatrix;
 use nalgebra::{DMatrix, DMatrixView, Dyn, Vector2};
 
@@ -129,11 +129,10 @@ fn fill_small_columns(
     let pose = &model.rig_from_board[view.pose_idx];
     let by_rig = l.by_point * camera.camera_from_rig.rotation;
     let by_height = by_rig * pose.rotation.column(2);
-    let by_pose_turn = -by_rig * skew(&seen.turned_in_board);
-    let by_camera_turn = -l.by_point * skew(&seen.turned_in_rig);
+    let by_pose = RigidTransform::by_step(&by_rig, &seen.turned_in_board);
+    let by_camera = RigidTransform::by_step(&l.by_point, &seen.turned_in_rig);
     let corner = &view.corners[corner_idx].point_in_board;
-    let blocks = [by_pose_turn, by_rig, by_camera_turn, l.by_point];
-    for (target, block) in row.chunks_exact_mut(3).zip(&blocks) {
+    for (target, block) in row.chunks_exact_mut(6).zip(&[by_pose, by_camera]) {
         for (entry, column) in target.iter_mut().zip(block.column_iter()) {
             *entry = column.into();
         }

@@ -6,8 +6,7 @@ use super::normal_equations::{NormalEquations, parameters_to_columns};
 use super::reduced::{Eliminated, Reduced};
 use crate::adjust::model::{Layout, Model};
 use crate::adjust::residual::linearize;
-use calib_rays::geometry::PixelPoint;
-use calib_rays::geometry::so3::skew;
+use calib_rays::geometry::{PixelPoint, RigidTransform};
 use calib_rays::numerics::cholesky::gram;
 use nalgebra::{DMatrix, DVector, Matrix2x3, Vector3, Vector6};
 
@@ -173,8 +172,8 @@ fn forms(
         &mut products,
     );
     let ranges = &layout.cameras[sighting.camera_idx];
-    let by_pose_turn = -by_rig * skew(&turned_in_board);
-    let by_camera_turn = -l.by_point * skew(&turned_in_rig);
+    let by_pose = RigidTransform::by_step(&by_rig, &turned_in_board);
+    let by_camera = RigidTransform::by_step(&l.by_point, &turned_in_rig);
     let component_forms = |r: usize| {
         let mut columns = DVector::zeros(components.len());
         for a in 0..components.count() {
@@ -193,21 +192,11 @@ fn forms(
             .rows_mut(ranges.direction.start, own.len())
             .copy_from(&own);
         if let Some(range) = &ranges.extrinsics {
-            for k in 0..3 {
-                global[range.start + k] = by_camera_turn[(r, k)];
-                global[range.start + 3 + k] = l.by_point[(r, k)];
+            for k in 0..6 {
+                global[range.start + k] = by_camera[(r, k)];
             }
         }
         global
-    };
-    let pose_forms = |r: usize| {
-        Vector6::from_fn(|k, _| {
-            if k < 3 {
-                by_pose_turn[(r, k)]
-            } else {
-                by_rig[(r, k - 3)]
-            }
-        })
     };
     let mut knots = Vec::new();
     if let (Some(order), Some(spline)) = (camera.knot_order(), &camera.field.direction.spline) {
@@ -223,7 +212,7 @@ fn forms(
     }
     Some(Forms {
         global: [component_forms(0), component_forms(1)],
-        pose: [pose_forms(0), pose_forms(1)],
+        pose: [0, 1].map(|r| by_pose.row(r).transpose()),
         knots,
         by_point: by_rig * pose.rotation,
     })
