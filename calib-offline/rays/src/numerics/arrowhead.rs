@@ -1,7 +1,9 @@
 //! Normal equations with an arrow's shape: what all views share in one block, each pose in a 6 x 6
-//! block of its own that knows the others through the shared block only.
+//! block of its own that knows the others through the shared block only. Eliminating the poses leaves a
+//! Schur complement; the work is linear in their number.
 
-use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+use super::cholesky::{BandedCholesky, gram};
+use nalgebra::{Cholesky, Const, DMatrix, DVector, Matrix6, Vector6};
 
 /// The equations `H step = -gradient` of a weighted sum of squares and its value.
 #[derive(Debug, Clone)]
@@ -36,13 +38,19 @@ pub struct Step {
     pub promised: f64,
 }
 
-/// The shared equations with the poses eliminated.
-struct Reduced {
-    shared: DMatrix<f64>,
-    right: DVector<f64>,
-    /// Inverses of the pose blocks.
-    pose_inverses: Vec<Matrix6<f64>>,
+/// The shared equations with the poses eliminated: a Schur complement.
+#[derive(Debug, Clone)]
+pub struct PosesEliminated {
+    /// What is left of the shared block, its lower triangle.
+    pub shared: DMatrix<f64>,
+    /// The right-hand side that goes with it.
+    pub right: DVector<f64>,
+    /// Factors of the pose blocks.
+    pub factors: Vec<PoseFactor>,
 }
+
+/// The factorized block of a pose.
+pub type PoseFactor = Cholesky<f64, Const<6>>;
 
 impl Arrowhead {
     /// Zeros.
@@ -59,35 +67,70 @@ impl Arrowhead {
         }
     }
 
+    /// Eliminates the poses, the diagonal of H enlarged by the factor `1 + damping`. `None` if one of
+    /// them is not determined.
+    pub fn eliminate_poses(&self, damping: f64) -> Option<PosesEliminated> {
+        let mut shared = damped(&self.shared, damping);
+        let shared_count = shared.nrows();
+        let mut right = -&self.shared_gradient;
+        // With V = L L^T and Y = L^-1 W^T, the pose takes Y^T Y off the shared block.
+        let mut y = DMatrix::zeros(shared_count, 6 * self.poses.len());
+        let mut factors = Vec::with_capacity(self.poses.len());
+        for (idx, pose) in self.poses.iter().enumerate() {
+            let factor = damped_own(pose, damping).cholesky()?;
+            let inverse = factor
+                .l_dirty()
+                .solve_lower_triangular(&Matrix6::identity())?;
+            y.columns_mut(6 * idx, 6)
+                .gemm(1.0, &pose.cross, &inverse.transpose(), 0.0);
+            right += &pose.cross * factor.solve(&pose.gradient);
+            factors.push(factor);
+        }
+        // Column-major y is its transpose in row-major storage.
+        shared -= gram(y.as_slice(), &vec![0; shared_count]);
+        Some(PosesEliminated {
+            shared,
+            right,
+            factors,
+        })
+    }
+
+    /// The steps of the poses that go with a step of what is shared.
+    pub fn pose_steps(&self, factors: &[PoseFactor], shared: &DVector<f64>) -> Vec<Vector6<f64>> {
+        self.poses
+            .iter()
+            .zip(factors)
+            .map(|(pose, factor)| {
+                let pulled = pose.cross.tr_mul(shared);
+                factor.solve(&(-pose.gradient - pulled.fixed_rows::<6>(0)))
+            })
+            .collect()
+    }
+
+    /// The products of a step with the gradient, and with itself through the diagonal of H.
+    pub fn along(&self, shared: &DVector<f64>, poses: &[Vector6<f64>]) -> (f64, f64) {
+        let mut linear = self.shared_gradient.dot(shared);
+        let mut diagonal: f64 = (0..shared.len())
+            .map(|k| self.shared[(k, k)] * shared[k].powi(2))
+            .sum();
+        for (pose, step) in self.poses.iter().zip(poses) {
+            linear += pose.gradient.dot(step);
+            let squares = (0..6).map(|k| pose.own[(k, k)] * step[k].powi(2));
+            diagonal += squares.sum::<f64>();
+        }
+        (linear, diagonal)
+    }
+
     /// The step with the diagonal of H enlarged by the factor `1 + damping`. `None` if the equations
     /// are singular even so.
     pub fn step(&self, damping: f64) -> Option<Step> {
-        let Reduced {
-            shared: reduced,
-            right,
-            pose_inverses,
-        } = self.reduce(damping)?;
-        let shared = if reduced.is_empty() {
-            right
-        } else {
-            reduced.cholesky()?.solve(&right)
-        };
-        let mut promised = 0.0;
-        let mut model = |step: f64, gradient: f64, diagonal: f64| {
-            // -(2 g s + s H s) with H s = -g - damping D s.
-            promised -= step * gradient - damping * diagonal * step * step;
-        };
-        for (k, step) in shared.iter().enumerate() {
-            model(*step, self.shared_gradient[k], self.shared[(k, k)]);
-        }
-        let mut poses = Vec::with_capacity(self.poses.len());
-        for (block, inverse) in self.poses.iter().zip(&pose_inverses) {
-            let step = -(inverse * (block.gradient + block.cross.tr_mul(&shared)));
-            for k in 0..6 {
-                model(step[k], block.gradient[k], block.own[(k, k)]);
-            }
-            poses.push(step);
-        }
+        let eliminated = self.eliminate_poses(damping)?;
+        let mut shared = eliminated.right;
+        BandedCholesky::of_dense(&eliminated.shared)?.solve_vector(&mut shared);
+        let poses = self.pose_steps(&eliminated.factors, &shared);
+        // The step solves `(H + mu D) x = -g`, so `-(2 g.x + x.H x) = -g.x + mu x.D x`.
+        let (linear, diagonal) = self.along(&shared, &poses);
+        let promised = -linear + damping * diagonal;
         promised.is_finite().then_some(Step {
             shared,
             poses,
@@ -98,7 +141,7 @@ impl Arrowhead {
     /// Covariance of the shared parameters for residuals of unit variance, the poses being free.
     /// `None` if the data do not determine them.
     pub fn shared_covariance(&self) -> Option<DMatrix<f64>> {
-        let reduced = self.reduce(0.0)?.shared;
+        let reduced = self.eliminate_poses(0.0)?.shared;
         // Scaled to a diagonal of ones, so that what is left of a pivot is a share.
         let scale = reduced.diagonal().map(|d| 1.0 / d.sqrt());
         if !scale.iter().all(|s| s.is_finite()) {
@@ -108,32 +151,24 @@ impl Arrowhead {
         let inverse = (&scale * reduced * &scale).cholesky()?.inverse();
         Some(&scale * inverse * &scale)
     }
+}
 
-    /// Eliminates the poses, the diagonal of H enlarged by the factor `1 + damping`.
-    fn reduce(&self, damping: f64) -> Option<Reduced> {
-        let mut reduced = self.shared.clone();
-        for k in 0..reduced.nrows() {
-            reduced[(k, k)] *= 1.0 + damping;
-        }
-        let mut right = -&self.shared_gradient;
-        let mut inverses = Vec::with_capacity(self.poses.len());
-        for block in &self.poses {
-            let mut own = block.own;
-            for k in 0..6 {
-                own[(k, k)] *= 1.0 + damping;
-            }
-            let inverse = own.cholesky()?.inverse();
-            let product = &block.cross * inverse;
-            reduced.gemm(-1.0, &product, &block.cross.transpose(), 1.0);
-            right.gemv(1.0, &product, &block.gradient, 1.0);
-            inverses.push(inverse);
-        }
-        Some(Reduced {
-            shared: reduced,
-            right,
-            pose_inverses: inverses,
-        })
+/// The matrix with its diagonal enlarged.
+pub fn damped(matrix: &DMatrix<f64>, damping: f64) -> DMatrix<f64> {
+    let mut matrix = matrix.clone();
+    for k in 0..matrix.nrows() {
+        matrix[(k, k)] *= 1.0 + damping;
     }
+    matrix
+}
+
+/// A pose's own block with its diagonal enlarged.
+pub fn damped_own(pose: &PoseBlock, damping: f64) -> Matrix6<f64> {
+    let mut own = pose.own;
+    for k in 0..6 {
+        own[(k, k)] *= 1.0 + damping;
+    }
+    own
 }
 
 #[cfg(test)]

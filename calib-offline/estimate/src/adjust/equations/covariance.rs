@@ -74,7 +74,7 @@ pub fn sighting_covariance(
                     own.set_column(2 * k + component, &form.pose[component]);
                 }
             }
-            border -= &equations.coupling[pose_idx] * factor.solve(&own);
+            border -= &equations.arrow.poses[pose_idx].cross * factor.solve(&own);
             factor.l_dirty().solve_lower_triangular_mut(&mut own);
             covariance += own.transpose() * &own;
         }

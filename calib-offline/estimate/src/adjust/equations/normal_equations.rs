@@ -17,19 +17,16 @@ use crate::adjust::objective::Weights;
 use crate::adjust::observations::{Observations, ViewBasis};
 use crate::adjust::priors::Priors;
 use calib_rays::field::structured::StructuredBasis;
-use calib_rays::numerics::cholesky::{BandedCholesky, gram};
-use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+use calib_rays::numerics::arrowhead::{Arrowhead, PosesEliminated, damped, damped_own};
+use calib_rays::numerics::cholesky::BandedCholesky;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// The equations `H step = -gradient` of one linearization, priors included.
 #[derive(Debug, Clone)]
 pub struct NormalEquations {
-    global: DMatrix<f64>,
-    global_gradient: DVector<f64>,
-    poses: Vec<Matrix6<f64>>,
-    pose_gradients: Vec<Vector6<f64>>,
-    /// Global x 6 per pose.
-    pub(super) coupling: Vec<DMatrix<f64>>,
+    /// Of the global parameters and the poses.
+    pub(super) arrow: Arrowhead,
     splines: Vec<Option<SplineBlock>>,
 }
 
@@ -43,13 +40,8 @@ impl NormalEquations {
         weights: &Weights,
         priors: &Priors,
     ) -> Self {
-        let pose_count = observations.poses.len();
         let mut equations = Self {
-            global: DMatrix::zeros(layout.global_len, layout.global_len),
-            global_gradient: DVector::zeros(layout.global_len),
-            poses: vec![Matrix6::zeros(); pose_count],
-            pose_gradients: vec![Vector6::zeros(); pose_count],
-            coupling: vec![DMatrix::zeros(layout.global_len, 6); pose_count],
+            arrow: Arrowhead::new(layout.global_len, observations.poses.len()),
             splines: Vec::new(),
         };
         let sums: Vec<ViewSums> = observations
@@ -126,7 +118,8 @@ impl NormalEquations {
         block.fill_upper_triangle_with_lower_triangle();
         let carried = to_columns.transpose() * (block * to_columns);
         let start = layout.cameras[camera_idx].direction.start;
-        self.global
+        self.arrow
+            .shared
             .view_mut((start, start), carried.shape())
             .copy_from(&carried);
     }
@@ -143,31 +136,36 @@ impl NormalEquations {
         let start = layout.cameras[view.camera_idx].direction.start;
         let field = start..start + carried.nrows();
         let gradient = sums.small.ncols() - 1;
-        let coupling = &mut self.coupling[view.pose_idx];
+        let Arrowhead {
+            shared,
+            shared_gradient,
+            poses,
+        } = &mut self.arrow;
+        let pose = &mut poses[view.pose_idx];
         for k in 0..6 {
-            let mut column = coupling.column_mut(k);
+            let mut column = pose.cross.column_mut(k);
             let mut rows = column.rows_range_mut(field.clone());
             rows += carried.column(k);
         }
-        self.poses[view.pose_idx] += sums.small.fixed_view::<6, 6>(0, 0);
-        self.pose_gradients[view.pose_idx] += sums.small.fixed_view::<6, 1>(0, gradient);
-        let mut gradient_rows = self.global_gradient.rows_range_mut(field.clone());
+        pose.own += sums.small.fixed_view::<6, 6>(0, 0);
+        pose.gradient += sums.small.fixed_view::<6, 1>(0, gradient);
+        let mut gradient_rows = shared_gradient.rows_range_mut(field.clone());
         gradient_rows += carried.column(gradient);
         let targets: Vec<(usize, usize)> = fixed_columns(layout, view.camera_idx)
             .enumerate()
             .filter_map(|(k, global)| Some((global?, EXTRINSICS + k)))
             .collect();
         for (global, small) in &targets {
-            self.global_gradient[*global] += sums.small[(*small, gradient)];
+            shared_gradient[*global] += sums.small[(*small, gradient)];
             for k in 0..6 {
-                coupling[(*global, k)] += sums.small[(*small, k)];
+                pose.cross[(*global, k)] += sums.small[(*small, k)];
             }
             for (other_global, other_small) in &targets {
-                self.global[(*global, *other_global)] += sums.small[(*small, *other_small)];
+                shared[(*global, *other_global)] += sums.small[(*small, *other_small)];
             }
             for (row, value) in field.clone().zip(carried.column(*small).iter()) {
-                self.global[(row, *global)] += value;
-                self.global[(*global, row)] += value;
+                shared[(row, *global)] += value;
+                shared[(*global, row)] += value;
             }
         }
     }
@@ -187,16 +185,16 @@ impl NormalEquations {
                 .zip(amounts.iter().zip(&priors.direction));
             let offset = ranges.offset.clone().zip(offset.iter().zip(&priors.offset));
             for (row, (amount, weight)) in direction.chain(offset) {
-                self.global[(row, row)] += weight;
-                self.global_gradient[row] += weight * amount;
+                self.arrow.shared[(row, row)] += weight;
+                self.arrow.shared_gradient[row] += weight * amount;
             }
             if let (Some(block), Some(energy)) = (spline, &priors.thin_plate) {
                 block.add_prior(priors.spline, energy, &camera.spline_amounts());
             }
         }
         for (row, term) in layout.board.clone().zip(&model.board_shape.terms) {
-            self.global[(row, row)] += priors.board;
-            self.global_gradient[row] += priors.board * term.2;
+            self.arrow.shared[(row, row)] += priors.board;
+            self.arrow.shared_gradient[row] += priors.board * term.2;
         }
     }
 
@@ -204,81 +202,45 @@ impl NormalEquations {
     ///
     /// `None` if a block is not positive definite: something the data do not determine.
     pub fn reduce(&self, damping: f64) -> Option<Reduced> {
-        let mut global = self.global.clone();
-        scale_diagonal(&mut global, damping);
-        let poses: Vec<Matrix6<f64>> = self
-            .poses
-            .iter()
-            .map(|block| {
-                let mut damped = *block;
-                for k in 0..6 {
-                    damped[(k, k)] *= 1.0 + damping;
-                }
-                damped
-            })
-            .collect();
-        if self.splines.iter().all(Option::is_none) {
-            self.reduce_poses(global, &poses)
-        } else {
-            self.reduce_splines(&global, &poses, damping)
+        if self.splines.iter().any(Option::is_some) {
+            return self.reduce_splines(damping);
         }
-    }
-
-    /// Without splines: the poses go first.
-    fn reduce_poses(&self, mut global: DMatrix<f64>, poses: &[Matrix6<f64>]) -> Option<Reduced> {
-        let global_len = global.nrows();
-        let mut right = -&self.global_gradient;
-        // With V = L L^T and Y = L^-1 W^T, the pose takes Y^T Y off the global block.
-        let mut y = DMatrix::zeros(global_len, 6 * poses.len());
-        let mut factors = Vec::with_capacity(poses.len());
-        for (idx, (block, gradient)) in poses.iter().zip(&self.pose_gradients).enumerate() {
-            let coupling = &self.coupling[idx];
-            let factor = block.cholesky()?;
-            let inverse = factor
-                .l_dirty()
-                .solve_lower_triangular(&Matrix6::identity())?;
-            y.columns_mut(6 * idx, 6)
-                .gemm(1.0, coupling, &inverse.transpose(), 0.0);
-            right += coupling * factor.solve(gradient);
-            factors.push(factor);
-        }
-        // Column-major y is its transpose in row-major storage.
-        global -= gram(y.as_slice(), &vec![0; global_len]);
-        Some(Reduced {
-            border: BandedCholesky::of_dense(&global)?,
+        let PosesEliminated {
+            shared,
             right,
-            global_len,
+            factors,
+        } = self.arrow.eliminate_poses(damping)?;
+        Some(Reduced {
+            border: BandedCholesky::of_dense(&shared)?,
+            right,
+            global_len: shared.nrows(),
             eliminated: Eliminated::Poses(factors),
         })
     }
 
     /// With splines: they go first, each from its band.
-    fn reduce_splines(
-        &self,
-        global: &DMatrix<f64>,
-        poses: &[Matrix6<f64>],
-        damping: f64,
-    ) -> Option<Reduced> {
-        let global_len = global.nrows();
-        let size = global_len + 6 * poses.len();
+    fn reduce_splines(&self, damping: f64) -> Option<Reduced> {
+        let arrow = &self.arrow;
+        let global_len = arrow.shared.nrows();
+        let size = global_len + 6 * arrow.poses.len();
         // The lower triangle.
         let mut border = DMatrix::zeros(size, size);
         let mut right = DVector::zeros(size);
         border
             .view_mut((0, 0), (global_len, global_len))
-            .copy_from(global);
+            .copy_from(&damped(&arrow.shared, damping));
         right
             .rows_mut(0, global_len)
-            .copy_from(&-&self.global_gradient);
-        for (pose_idx, block) in poses.iter().enumerate() {
+            .copy_from(&-&arrow.shared_gradient);
+        for (pose_idx, pose) in arrow.poses.iter().enumerate() {
             let at = global_len + 6 * pose_idx;
-            border.view_mut((at, at), (6, 6)).copy_from(block);
+            border
+                .view_mut((at, at), (6, 6))
+                .copy_from(&damped_own(pose, damping));
             border
                 .view_mut((at, 0), (6, global_len))
-                .copy_from(&self.coupling[pose_idx].transpose());
-            right
-                .rows_mut(at, 6)
-                .copy_from(&-self.pose_gradients[pose_idx]);
+                .copy_from(&pose.cross.transpose());
+            right.rows_mut(at, 6).copy_from(&-pose.gradient);
         }
         let eliminated: Vec<Option<EliminatedSpline>> = self
             .splines
@@ -304,23 +266,11 @@ impl NormalEquations {
         let mut border = reduced.right.clone();
         reduced.border.solve_vector(&mut border);
         match &reduced.eliminated {
-            Eliminated::Poses(factors) => {
-                let poses = self
-                    .pose_gradients
-                    .iter()
-                    .zip(&self.coupling)
-                    .zip(factors)
-                    .map(|((gradient, coupling), factor)| {
-                        let pulled = coupling.tr_mul(&border);
-                        factor.solve(&(-gradient - pulled.fixed_rows::<6>(0)))
-                    })
-                    .collect();
-                Step {
-                    splines: vec![DVector::zeros(0); self.splines.len()],
-                    global: border,
-                    poses,
-                }
-            }
+            Eliminated::Poses(factors) => Step {
+                splines: vec![DVector::zeros(0); self.splines.len()],
+                poses: self.arrow.pose_steps(factors, &border),
+                global: border,
+            },
             Eliminated::Splines(splines) => {
                 let splines = splines
                     .iter()
@@ -331,7 +281,7 @@ impl NormalEquations {
                     })
                     .collect();
                 let global_len = reduced.global_len;
-                let poses = (0..self.poses.len())
+                let poses = (0..self.arrow.poses.len())
                     .map(|idx| border.fixed_rows::<6>(global_len + 6 * idx).into_owned())
                     .collect();
                 Step {
@@ -347,16 +297,7 @@ impl NormalEquations {
     ///
     /// The step solves `(H + mu D) x = -g`, so `-(2 g.x + x.H x) = -g.x + mu x.D x`.
     pub fn predicted_decrease(&self, step: &Step, damping: f64) -> f64 {
-        let mut linear = self.global_gradient.dot(&step.global);
-        let mut diagonal: f64 = (0..step.global.len())
-            .map(|k| self.global[(k, k)] * step.global[k].powi(2))
-            .sum();
-        for ((block, gradient), pose) in
-            self.poses.iter().zip(&self.pose_gradients).zip(&step.poses)
-        {
-            linear += gradient.dot(pose);
-            diagonal += (0..6).map(|k| block[(k, k)] * pose[k].powi(2)).sum::<f64>();
-        }
+        let (mut linear, mut diagonal) = self.arrow.along(&step.global, &step.poses);
         for (block, change) in self.splines.iter().zip(&step.splines) {
             if let Some(block) = block {
                 linear += block.gradient.dot(change);
@@ -420,10 +361,4 @@ pub(super) fn parameters_to_columns(camera: &CameraModel) -> DMatrix<f64> {
         first += coefficients.ncols();
     }
     map
-}
-
-fn scale_diagonal(matrix: &mut DMatrix<f64>, damping: f64) {
-    for k in 0..matrix.nrows() {
-        matrix[(k, k)] *= 1.0 + damping;
-    }
 }
