@@ -9,6 +9,7 @@ mod left_out;
 mod parts;
 mod summary;
 
+use calib_rays::observed::poses;
 pub use error::{CalibrateError, NoSuchPose};
 
 use crate::evaluate::half_data::first_half;

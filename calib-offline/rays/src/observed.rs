@@ -1,6 +1,7 @@
 //! What was seen of a board: labelled corners, view by view.
 
 use crate::geometry::PixelPoint;
+use std::collections::BTreeSet;
 
 /// Fewest poses of the board that determine a camera: with two, the focal length of a general
 /// view is fixed only if nothing else is unknown.
@@ -29,4 +30,9 @@ pub struct View {
     pub pose: usize,
     /// The corners seen.
     pub corners: Vec<Corner>,
+}
+
+/// The distinct pose numbers among the views.
+pub fn poses(views: &[View]) -> BTreeSet<usize> {
+    views.iter().map(|view| view.pose).collect()
 }

@@ -1,12 +1,11 @@
 //! What a recording covers, before any estimate: which views there are, where on the sensor
 //! corners were seen, and which shot to add.
 
-use crate::dataset::corners::poses;
 use crate::dataset::{Dataset, check_sufficiency};
 use crate::detect::suspicion::turns_like_image;
 use calib_rays::field::CoverageMask;
 use calib_rays::geometry::{PixelPoint, SensorSize};
-use calib_rays::observed::{Corner, View};
+use calib_rays::observed::{Corner, View, poses};
 use serde::Serialize;
 
 /// Fewer poses than this leave little to hold out.

@@ -138,7 +138,7 @@ fn held_out_record(held_out: &HeldOut) -> Option<HeldOutRecord> {
 
 fn pose_records(parts: &Parts, camera_count: usize) -> Vec<PoseRecord> {
     let solution = parts.solution;
-    let all_poses = calib_recording::dataset::corners::poses(&parts.corners.views);
+    let all_poses = calib_rays::observed::poses(&parts.corners.views);
     solution
         .rig_from_board
         .iter()
@@ -172,7 +172,7 @@ fn pose_records(parts: &Parts, camera_count: usize) -> Vec<PoseRecord> {
 }
 
 fn stage_axes(parts: &Parts, poses: &[PoseRecord]) -> Vec<StageAxis> {
-    let all_poses = calib_recording::dataset::corners::poses(&parts.corners.views);
+    let all_poses = calib_rays::observed::poses(&parts.corners.views);
     let boards: Vec<_> = poses.iter().map(|p| (p.pose, p.rig_from_board)).collect();
     fit_stage_axes(&boards, |pose| {
         stage::entry(parts.dataset, &all_poses, pose).placement

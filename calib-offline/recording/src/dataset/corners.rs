@@ -1,22 +1,18 @@
 //! `corners.csv`: labelled corners in and out. One row per corner, header
 //! `camera,pose,row,col,u,v` with an optional seventh column `sigma_px`.
 
-mod error;
+pub(super) mod error;
+mod header;
 
 pub use error::CornersError;
+pub use header::{HEADER, HEADER_WITH_SIGMA};
 
 use super::Dataset;
 use crate::atomic_file::{self, WriteError};
 use calib_rays::geometry::PixelPoint;
 use calib_rays::observed::{Corner, View};
-use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::Path;
-
-/// The header without the optional column.
-pub const HEADER: &str = "camera,pose,row,col,u,v";
-/// The header with the optional column.
-pub const HEADER_WITH_SIGMA: &str = "camera,pose,row,col,u,v,sigma_px";
 
 /// One line of the file.
 #[derive(Debug, Clone, Copy)]
@@ -313,11 +309,6 @@ pub fn format_corners(dataset: &Dataset, views: &[View]) -> String {
         }
     }
     text
-}
-
-/// The distinct pose numbers among the views.
-pub fn poses(views: &[View]) -> BTreeSet<usize> {
-    views.iter().map(|view| view.pose).collect()
 }
 
 /// A field without the blanks around it, and without the quotes that some programs put around

@@ -3,102 +3,27 @@
 
 mod error;
 mod images;
+mod limits;
+mod raw;
+mod source;
 mod target;
+mod target_problem;
 
 pub use error::ManifestError;
-pub use target::TargetProblem;
+pub use limits::{
+    MAX_CAMERAS, MAX_CORNERS_PER_SIDE, MAX_NAME_CHARS, MAX_SENSOR_PX, MAX_SQUARE_MM,
+    MIN_CORNERS_PER_SIDE, MIN_SQUARE_MM,
+};
+pub use target_problem::TargetProblem;
 
-use super::{CameraSpec, Dataset, StageSpec};
+use super::description::{CameraSpec, Dataset, StageSpec};
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::SensorSize;
-use serde::Deserialize;
+use raw::{RawBoard, RawCamera, RawManifest, RawStage};
+use source::{Source, ranged, read};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
-
-/// Fewest inner corners along a side: fewer leave no distance to compare with its neighbor.
-pub const MIN_CORNERS_PER_SIDE: i64 = 3;
-
-/// Most inner corners along a side; more is a slip of the pen.
-pub const MAX_CORNERS_PER_SIDE: i64 = 1000;
-
-/// Longest side of a sensor, px: the longest that a blob can describe.
-pub const MAX_SENSOR_PX: i64 = ray_runtime::format::MAX_EXTENT_PX as i64;
-
-/// Most cameras: the most that a blob can hold.
-pub const MAX_CAMERAS: usize = ray_runtime::format::MAX_CAMERAS as usize;
-
-/// Longest name of a camera, characters; it stands in CSV headers and in the blob.
-pub const MAX_NAME_CHARS: usize = 64;
-
-/// Smallest square, mm: a micrometer. Less is a slip of the pen or of the unit.
-pub const MIN_SQUARE_MM: f64 = 1e-3;
-
-/// Largest square, mm: ten meters. More is a slip of the pen or of the unit.
-pub const MAX_SQUARE_MM: f64 = 1e4;
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawManifest {
-    dataset: Option<RawDataset>,
-    board: Option<Spanned<RawBoard>>,
-    #[serde(default)]
-    camera: Vec<Spanned<RawCamera>>,
-    stage: Option<RawStage>,
-    target: Option<Spanned<target::RawTarget>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawDataset {
-    #[serde(default)]
-    exclude: Vec<Spanned<usize>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawBoard {
-    kind: Option<Spanned<String>>,
-    rows: Option<Spanned<i64>>,
-    cols: Option<Spanned<i64>>,
-    square_mm: Option<Spanned<f64>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawCamera {
-    name: Option<Spanned<String>>,
-    width: Option<Spanned<i64>>,
-    height: Option<Spanned<i64>>,
-    images: Option<Spanned<String>>,
-    image_list: Option<Spanned<Vec<String>>>,
-    target_images: Option<Spanned<String>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawStage {
-    angles_deg: Option<Spanned<Vec<f64>>>,
-    placement: Option<Spanned<Vec<usize>>>,
-}
-
-/// The manifest's text, to name lines of it.
-struct Source {
-    file: PathBuf,
-    text: String,
-}
-
-impl Source {
-    fn line(&self, byte: usize) -> usize {
-        self.text.as_bytes()[..byte.min(self.text.len())]
-            .split(|b| *b == b'\n')
-            .count()
-    }
-
-    fn line_of<T>(&self, value: &Spanned<T>) -> usize {
-        self.line(value.span().start)
-    }
-}
 
 impl Dataset {
     /// Reads the manifest of a dataset: a folder with `dataset.toml`, or that file.
@@ -150,38 +75,6 @@ impl Dataset {
             };
         }
         Ok(dataset)
-    }
-}
-
-fn read(path: &Path) -> Result<Source, ManifestError> {
-    let file = if path.is_dir() {
-        path.join(Dataset::MANIFEST)
-    } else {
-        path.to_owned()
-    };
-    let named_so = file.file_name().is_some_and(|n| n == Dataset::MANIFEST);
-    if !named_so || !file.is_file() {
-        return Err(ManifestError::NotFound {
-            path: path.to_owned(),
-        });
-    }
-    let bytes = std::fs::read(&file).map_err(|source| ManifestError::Read {
-        file: file.clone(),
-        source,
-    })?;
-    match String::from_utf8(bytes) {
-        // The mark that some editors put before UTF-8 is no part of the text.
-        Ok(text) => Ok(Source {
-            text: match text.strip_prefix('\u{feff}') {
-                Some(rest) => rest.to_owned(),
-                None => text,
-            },
-            file,
-        }),
-        Err(error) => Err(ManifestError::NotText {
-            file,
-            byte: error.utf8_error().valid_up_to(),
-        }),
     }
 }
 
@@ -243,32 +136,6 @@ fn board(source: &Source, raw: Option<Spanned<RawBoard>>) -> Result<BoardSpec, M
         line: source.line_of(&square_mm),
         value,
         problem,
-    })
-}
-
-fn ranged(
-    source: &Source,
-    table_line: usize,
-    value: Option<Spanned<i64>>,
-    key: &'static str,
-    least: i64,
-    most: i64,
-) -> Result<i64, ManifestError> {
-    let value = value.ok_or_else(|| ManifestError::Missing {
-        file: source.file.clone(),
-        line: table_line,
-        key,
-    })?;
-    if (least..=most).contains(value.get_ref()) {
-        return Ok(value.into_inner());
-    }
-    Err(ManifestError::OutOfRange {
-        file: source.file.clone(),
-        line: source.line_of(&value),
-        key,
-        value: value.into_inner(),
-        least,
-        most,
     })
 }
 

@@ -1,8 +1,7 @@
 //! Which poses are used, and which are held out to check the result. Always by whole poses: the
 //! corners of one board share its pose, so single corners would not be independent.
 
-use super::corners::poses;
-use calib_rays::observed::View;
+use calib_rays::observed::{View, poses};
 use std::collections::BTreeSet;
 
 /// Views that go on and poses that the user left out.

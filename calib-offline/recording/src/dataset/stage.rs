@@ -6,8 +6,8 @@
 //! neither is an error.
 
 use super::Dataset;
-use super::corners::{CornersError, poses};
-use calib_rays::observed::View;
+use super::corners::error::CornersError;
+use calib_rays::observed::{View, poses};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What the stage says of one pose.

@@ -1,8 +1,7 @@
 //! Whether the corners could determine a calibration at all: cheap counts before any estimate.
 
 use super::Dataset;
-use super::corners::poses;
-use calib_rays::observed::{Corner, MIN_POSES, View};
+use calib_rays::observed::{Corner, MIN_POSES, View, poses};
 use calib_rays::remedy::Remedy;
 
 /// Corners of a view lie on a line if their scatter across it is below this share of the scatter

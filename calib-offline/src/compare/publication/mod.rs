@@ -28,9 +28,9 @@ pub use error::ExperimentError;
 
 use crate::methods::Screened;
 use crate::pipeline::{self, camera_names, explained, offered};
+use calib_rays::observed::poses;
 use calib_rays::progress::Progress;
 use calib_recording::dataset::Dataset;
-use calib_recording::dataset::corners::poses;
 use calib_recording::dataset::stage::{entry, placements};
 use calib_recording::detect::DetectSettings;
 use runs::MethodRun;

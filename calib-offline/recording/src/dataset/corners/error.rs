@@ -1,6 +1,6 @@
 //! What can be wrong with `corners.csv`, where, and what to do about it.
 
-use super::{HEADER, HEADER_WITH_SIGMA};
+use super::header::{HEADER, HEADER_WITH_SIGMA};
 use crate::dataset::Dataset;
 use calib_rays::geometry::{PixelPoint, SensorSize};
 use calib_rays::remedy::Remedy;

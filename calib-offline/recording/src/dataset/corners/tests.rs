@@ -2,7 +2,9 @@ use super::*;
 use crate::dataset::{CameraSpec, StageSpec};
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::SensorSize;
+use calib_rays::observed::poses;
 use calib_rays::remedy::Remedy as _;
+use std::collections::BTreeSet;
 
 fn dataset() -> Dataset {
     Dataset {

@@ -1,6 +1,7 @@
 //! What can be wrong with `dataset.toml`, where, and what to do about it.
 
-use super::target::TargetProblem;
+use super::limits::MAX_CAMERAS;
+use super::target_problem::TargetProblem;
 use crate::dataset::Dataset;
 use calib_rays::remedy::Remedy;
 use std::path::PathBuf;
@@ -108,7 +109,7 @@ pub enum ManifestError {
         name: String,
     },
     /// More cameras than a blob can hold.
-    #[error("{}:{line}: there are {have} cameras; {} are possible", file.display(), super::MAX_CAMERAS)]
+    #[error("{}:{line}: there are {have} cameras; {} are possible", file.display(), MAX_CAMERAS)]
     TooManyCameras {
         /// The manifest.
         file: PathBuf,

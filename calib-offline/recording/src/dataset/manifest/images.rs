@@ -1,6 +1,8 @@
 //! Which image files a camera of the manifest means.
 
-use super::{ManifestError, RawCamera, Source};
+use super::error::ManifestError;
+use super::raw::RawCamera;
+use super::source::Source;
 use crate::dataset::image_files::{matching_files, split_pattern};
 use std::path::{Path, PathBuf};
 use toml::Spanned;

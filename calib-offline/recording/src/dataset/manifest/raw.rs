@@ -1,0 +1,61 @@
+//! The tables of `dataset.toml` as they are read, before anything is checked.
+
+use serde::Deserialize;
+use toml::Spanned;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawManifest {
+    pub dataset: Option<RawDataset>,
+    pub board: Option<Spanned<RawBoard>>,
+    #[serde(default)]
+    pub camera: Vec<Spanned<RawCamera>>,
+    pub stage: Option<RawStage>,
+    pub target: Option<Spanned<RawTarget>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawDataset {
+    #[serde(default)]
+    pub exclude: Vec<Spanned<usize>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawBoard {
+    pub kind: Option<Spanned<String>>,
+    pub rows: Option<Spanned<i64>>,
+    pub cols: Option<Spanned<i64>>,
+    pub square_mm: Option<Spanned<f64>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawCamera {
+    pub name: Option<Spanned<String>>,
+    pub width: Option<Spanned<i64>>,
+    pub height: Option<Spanned<i64>>,
+    pub images: Option<Spanned<String>>,
+    pub image_list: Option<Spanned<Vec<String>>>,
+    pub target_images: Option<Spanned<String>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawStage {
+    pub angles_deg: Option<Spanned<Vec<f64>>>,
+    pub placement: Option<Spanned<Vec<usize>>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawTarget {
+    pub kind: Option<Spanned<String>>,
+    pub rows: Option<Spanned<i64>>,
+    pub cols: Option<Spanned<i64>>,
+    pub pitch_mm: Option<Spanned<f64>>,
+    pub outer_radius_mm: Option<Spanned<f64>>,
+    pub direction_outer_radius_mm: Option<Spanned<f64>>,
+    pub direction: Option<Spanned<Vec<Spanned<Vec<i64>>>>>,
+}
