@@ -9,7 +9,6 @@ mod left_out;
 mod parts;
 mod summary;
 
-use calib_rays::observed::poses;
 pub use error::{CalibrateError, NoSuchPose};
 
 use crate::evaluate::half_data::first_half;

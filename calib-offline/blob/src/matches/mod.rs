@@ -17,7 +17,5 @@ pub use error::MatchesError;
 pub use header::Columns;
 pub use known::{KnownMatches, TruePoint, read_known};
 pub use list::read_matches;
+pub use row::POINTS_HEADER;
 pub use stream::{MeasureSummary, StreamError, measure_batches, measure_stream};
-
-/// The header of `POINTS.csv`.
-pub const POINTS_HEADER: &str = "id,x,y,z,gap,sigma_x,sigma_y,sigma_z,status";

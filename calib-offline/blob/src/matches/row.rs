@@ -4,6 +4,9 @@ use super::error::{RowProblem, shortened};
 use super::header::Columns;
 use calib_rays::measure::{Number, Point, Sighting, Status};
 
+/// The header of `POINTS.csv`.
+pub const POINTS_HEADER: &str = "id,x,y,z,gap,sigma_x,sigma_y,sigma_z,status";
+
 /// Reads a row into `sightings` (cleared first) and returns its id as it stands there.
 pub(super) fn parse<'a, N: Number>(
     line: &'a str,

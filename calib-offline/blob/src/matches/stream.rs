@@ -1,10 +1,9 @@
 //! A whole file of matches in blocks: read in order, computed in parallel or asked for elsewhere,
 //! written in order.
 
-use super::POINTS_HEADER;
 use super::error::{MatchesError, RowProblem, shortened};
 use super::header::Columns;
-use super::row;
+use super::row::{self, POINTS_HEADER};
 use calib_rays::measure::{BatchSource, Number, Point, PointSource, Sighting, Status};
 use rayon::prelude::*;
 use serde::Serialize;

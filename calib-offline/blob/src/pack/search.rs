@@ -1,10 +1,12 @@
 //! The table that suits best among those that hold the bound.
 
 use super::encode::BlobParts;
+use super::packed::{CurvePoint, Tried};
 use super::proof::{self, Proof};
 use super::quantized::{Number, Predictors};
+use super::settings::{PackSettings, Prefer};
 use super::table::Table;
-use super::{AlignedBytes, CurvePoint, PackError, PackSettings, Prefer, Tried, patches};
+use super::{AlignedBytes, PackError, patches};
 use calib_rays::field::CalibratedCamera;
 use calib_rays::field::spline::SplineGrid;
 use ray_runtime::RayBlob;

@@ -3,11 +3,11 @@
 use super::*;
 use calib_rays::field::spline::{Spline, SplineGrid};
 use calib_rays::field::{
-    BaseLens, CalibratedCamera, CoverageMask, Projection, RayField, SmoothMap,
+    BaseLens, CalibratedCamera, CoverageMask, Projection, RayField, Rig, SmoothMap,
 };
 use calib_rays::geometry::{PixelPoint, RigidTransform, SensorSize, so3};
 use nalgebra::{Vector2, Vector3};
-use ray_runtime::OpenError;
+use ray_runtime::{OpenError, RayBlob};
 
 const SENSOR: SensorSize = SensorSize::new(1280, 1024);
 

@@ -6,10 +6,9 @@
 //! estimate. Used to explain a failure, never to refuse what can be calibrated.
 
 use super::epipolar::{FundamentalMatrix, Match};
-use super::matches_of;
+use super::pair_check::matches_of;
 use crate::dataset::Dataset;
-use calib_rays::observed::Corner;
-use calib_rays::observed::View;
+use calib_rays::observed::{Corner, View};
 use calib_rays::remedy::Remedy;
 use std::collections::BTreeMap;
 

@@ -1,18 +1,18 @@
 //! One image from pixels to labelled marker centers, step by step.
 
-use super::TargetSettings;
 use super::candidates::{RingGuess, ring_candidates};
 use super::components::Polarity;
 use super::grid::{Cells, Node, largest_grid};
 use super::local_map::{LocalMap, MIN_POINTS};
+use super::located::{LabelledMarker, Located, at, quarter_turns};
 use super::perspective::edge_offsets;
 use super::placement::{Sized, Verdict, place};
 use super::ring_fit::{FittedRing, shape_of_circle};
 use super::ring_model::EdgeOffsets;
+use super::settings::TargetSettings;
 use super::verdict::TargetRefusal;
 use crate::dataset::TargetSpec;
 use crate::dataset::image::GrayImage;
-use calib_rays::geometry::PixelPoint;
 use calib_rays::numerics::median;
 use nalgebra::Vector2;
 use std::collections::BTreeMap;
@@ -31,28 +31,6 @@ const SIZE_RANGE: (f64, f64) = (0.85, 1.15);
 /// Edges blurred (standard deviation) by more than this part of a ring's width run into each
 /// other.
 const MAX_BLUR: f64 = 0.5;
-
-/// A marker with its label.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LabelledMarker {
-    /// Row on the target.
-    pub row: usize,
-    /// Column on the target.
-    pub col: usize,
-    /// The fit; its pixel is the image of the marker's center.
-    pub ring: FittedRing,
-    /// What the fit gave without the perspective: the middle of the ring's image.
-    pub uncorrected: PixelPoint,
-}
-
-/// A target found in an image.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Located {
-    /// By row and column.
-    pub markers: Vec<LabelledMarker>,
-    /// Quarter turns, clockwise on screen, from upright to how the target is seen: 0 to 3.
-    pub quarter_turns: u8,
-}
 
 /// Finds the target in an image and labels its markers.
 ///
@@ -162,10 +140,6 @@ fn node(ring: &FittedRing) -> Node {
         center: at(ring.pixel),
         shape: ring.shape,
     }
-}
-
-fn at(pixel: PixelPoint) -> Vector2<f64> {
-    Vector2::new(pixel.u, pixel.v)
 }
 
 fn grid_point((col, row): (i64, i64)) -> Vector2<f64> {
@@ -343,18 +317,4 @@ fn corrected(
             })
         })
         .collect()
-}
-
-/// How the target is turned on screen: from the mean direction of its columns.
-fn quarter_turns(labelled: &BTreeMap<(usize, usize), FittedRing>) -> u8 {
-    let along_columns: Vector2<f64> = labelled
-        .iter()
-        .filter_map(|(&(row, col), ring)| {
-            let next = labelled.get(&(row, col + 1))?;
-            Some(at(next.pixel) - at(ring.pixel))
-        })
-        .sum();
-    let angle_rad = along_columns.y.atan2(along_columns.x);
-    let quarters = (angle_rad / std::f64::consts::FRAC_PI_2).round() as i32;
-    quarters.rem_euclid(4) as u8
 }

@@ -10,108 +10,35 @@
 
 pub mod candidates;
 pub mod components;
+mod detection;
+mod error;
 pub mod grid;
 pub mod join;
 pub mod local_map;
 pub mod locate;
+pub mod located;
 pub mod overlay;
 pub mod perspective;
 pub mod placement;
 pub mod ring_fit;
 pub mod ring_model;
+mod settings;
 pub mod verdict;
 
+pub use detection::TargetDetection;
+pub use error::TargetError;
 pub use join::{MarkerMatch, join_markers};
-pub use locate::{LabelledMarker, Located, locate};
+pub use locate::locate;
+pub use located::{LabelledMarker, Located};
+pub use settings::TargetSettings;
 pub use verdict::{TargetFigures, TargetImage, TargetRefusal};
 
-use super::{DetectError, Job, all_loaded};
+use super::job::{Job, all_loaded};
 use crate::dataset::image::GrayImage;
-use crate::dataset::{CornersError, Dataset, TargetSpec, load_markers};
+use crate::dataset::{Dataset, TargetSpec, load_markers};
 use calib_rays::observed::{Corner, View};
 use calib_rays::progress::Progress;
-use calib_rays::remedy::Remedy;
 use rayon::prelude::*;
-
-/// Choices in the search for the target.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TargetSettings {
-    /// How often the centers are corrected for the perspective; 0 leaves the middles of the rings'
-    /// images. The second time the map behind the correction is free of the first error.
-    pub correction_rounds: usize,
-    /// Added in quadrature to the standard deviation that each fit predicts from its own residuals,
-    /// for what all models of an edge leave out, px.
-    pub sigma_floor_px: f64,
-}
-
-impl Default for TargetSettings {
-    fn default() -> Self {
-        Self {
-            correction_rounds: 2,
-            sigma_floor_px: 0.003,
-        }
-    }
-}
-
-/// What was found in a dataset's images of the target.
-#[derive(Debug)]
-pub struct TargetDetection {
-    /// The labelled markers by camera and pose, in the form of corners: `pose` is the index of the
-    /// target image, row and column are those on the target.
-    pub views: Vec<View>,
-    /// One verdict per image, by camera and pose.
-    pub images: Vec<TargetImage>,
-}
-
-/// Why a dataset has no labelled markers.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum TargetError {
-    /// The manifest describes no target.
-    #[error("{} describes no [target]", Dataset::MANIFEST)]
-    NoTarget,
-    /// There is nothing to look at.
-    #[error("no camera of {} has target_images", Dataset::MANIFEST)]
-    NoImages,
-    /// A file that is no image of its camera.
-    #[error(transparent)]
-    Images(#[from] DetectError),
-    /// Every image was refused.
-    #[error("none of {total} images of the target could be used; the first: {first}")]
-    AllRefused {
-        /// Images looked at.
-        total: usize,
-        /// File and reason of the first one.
-        first: String,
-    },
-    /// The markers that were there already.
-    #[error("the labelled markers cannot be used")]
-    Markers(#[from] CornersError),
-}
-
-impl Remedy for TargetError {
-    fn remedy(&self) -> Option<String> {
-        let text = match self {
-            Self::NoTarget => {
-                "describe it: [target] with kind = \"rings\", rows, cols, pitch_mm, outer_radius_mm, direction_outer_radius_mm, direction"
-            }
-            Self::NoImages => "add target_images = \"target/left/*.png\" to each [[camera]]",
-            Self::Images(DetectError::BrokenImage { source, .. }) => return source.remedy(),
-            Self::Images(_) => return None,
-            Self::AllRefused { .. } => {
-                "look at the images with calib-offline detect DATASET --target --overlay DIR"
-            }
-            Self::Markers(CornersError::OutOfBoard { .. }) => {
-                "rows and columns count from 0; correct them, or rows and cols of [target]"
-            }
-            Self::Markers(CornersError::NotText { .. } | CornersError::Empty { .. }) => {
-                "restore markers.csv, or delete it and run calib-offline detect DATASET --target"
-            }
-            Self::Markers(error) => return error.remedy(),
-        };
-        Some(text.to_owned())
-    }
-}
 
 /// Finds the target in every image of it and labels its markers.
 ///
@@ -182,26 +109,6 @@ pub fn target_views(
     match load_markers(dataset)? {
         Some(views) => Ok(views),
         None => detect_target(dataset, settings, progress)?.into_views(),
-    }
-}
-
-impl TargetDetection {
-    /// The views.
-    ///
-    /// # Errors
-    /// [`TargetError::AllRefused`] if there are none.
-    pub fn into_views(self) -> Result<Vec<View>, TargetError> {
-        if !self.views.is_empty() {
-            return Ok(self.views);
-        }
-        let first = self.images.iter().find_map(|image| {
-            let refusal = image.outcome.as_ref().err()?;
-            Some(format!("{}: {refusal}", image.path.display()))
-        });
-        Err(TargetError::AllRefused {
-            total: self.images.len(),
-            first: first.unwrap_or_default(),
-        })
     }
 }
 

@@ -1,6 +1,6 @@
 //! What became of an image of the target: located, or refused and why.
 
-use super::locate::Located;
+use super::located::Located;
 use super::ring_fit::FittedRing;
 use crate::dataset::TargetSpec;
 use crate::dataset::image::GrayImage;

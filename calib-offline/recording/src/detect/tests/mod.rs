@@ -9,6 +9,8 @@ use photo::{Photo, tilted};
 
 use super::*;
 use crate::dataset::{CameraSpec, StageSpec};
+use crate::detect::consistency::ConsistencyError;
+use calib_rays::geometry::SensorSize;
 use calib_rays::progress::Silent;
 use std::path::Path;
 
