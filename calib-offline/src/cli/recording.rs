@@ -7,7 +7,7 @@ use super::error::Error;
 use super::output::Console;
 use super::simulate::{SimulateArgs, SimulateSummary, run as run_simulate};
 use super::usage_error::UsageError;
-use crate::report::text::short;
+use crate::present::numbers::short;
 use calib_recording::atomic_file::{check_folder, check_place};
 use calib_recording::dataset::{Dataset, SufficiencyError, write_corners};
 use serde::Serialize;

@@ -1,7 +1,7 @@
 //! A comparison as a table for the terminal, as Markdown, and as CSV.
 
 use super::record::{Comparison, HeldOutFigures, MethodFigures};
-use crate::report::text::short;
+use crate::present::numbers::short;
 use std::fmt::Write as _;
 
 /// Columns of the table, before those of the truth.

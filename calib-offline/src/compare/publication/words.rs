@@ -6,7 +6,7 @@ use super::spread::SpreadExperiment;
 use super::stage::StageExperiment;
 use super::target::{TargetExperiment, TargetMethod};
 use crate::methods::METHODS;
-use crate::report::text::short;
+use crate::present::numbers::short;
 use std::fmt::Write as _;
 
 /// The publication's mean error of its method, mm.
