@@ -4,3 +4,4 @@ pub mod axes;
 pub mod chart;
 pub mod numbers;
 pub mod svg;
+pub mod table;

@@ -14,6 +14,16 @@ pub fn short(value: f64) -> String {
     }
 }
 
+/// What a cell for people says, also where there is nothing to say.
+pub fn or_dash(value: Option<impl ToString>) -> String {
+    value.map_or_else(|| "-".to_owned(), |value| value.to_string())
+}
+
+/// What a cell for programs says, also where there is nothing to say.
+pub fn or_empty(value: Option<impl ToString>) -> String {
+    value.map_or_else(String::new, |value| value.to_string())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
