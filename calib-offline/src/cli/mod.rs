@@ -8,6 +8,7 @@ pub mod calibrate;
 pub mod compare;
 pub mod demo;
 pub mod detect;
+mod detect_image;
 pub mod detect_target;
 pub mod device;
 pub mod error;
