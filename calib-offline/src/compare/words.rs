@@ -35,7 +35,7 @@ pub fn text(comparison: &Comparison) -> String {
 /// As a Markdown document.
 pub fn markdown(comparison: &Comparison) -> String {
     let lines: String = remarks(comparison)
-        .map(|line| format!("- {line}\n"))
+        .map(|line| "- ".to_owned() + &line + "\n")
         .collect();
     let table = table(comparison).markdown();
     format!(
