@@ -7,4 +7,5 @@ pub mod device;
 pub mod evaluate;
 pub mod methods;
 pub mod pipeline;
+pub mod present;
 pub mod report;

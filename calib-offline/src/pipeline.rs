@@ -4,31 +4,29 @@
 //! that cannot be what they claim; the joint estimate adjusts everything and looks at the views
 //! once more; held-out boards and the calibration itself judge it; the record says all of it.
 
+mod corners;
 pub mod error;
 mod left_out;
+mod offered;
 mod parts;
 mod summary;
 
+pub use corners::{Corners, corners};
 pub use error::{CalibrateError, NoSuchPose};
+pub use offered::{Offered, camera_names, explained, offered};
 
 use crate::evaluate::half_data::first_half;
 use crate::evaluate::held_out::folds_wanted;
 use crate::evaluate::verdict::Thresholds;
 use crate::evaluate::{Folds, held_out};
-use crate::methods::{Given, Joint, Method, MethodError, Own, fit_folds};
+use crate::methods::{Given, Joint, Method, Own, fit_folds};
 use crate::report::Calibration;
 use calib_estimate::adjust::Observations;
 use calib_rays::field::RayTable;
-use calib_rays::observed::View;
 use calib_rays::progress::Progress;
 use calib_recording::dataset::Dataset;
-use calib_recording::dataset::corners::load_corners;
-use calib_recording::dataset::split::without_excluded;
 use calib_recording::dataset::stage::placements;
-use calib_recording::dataset::sufficiency::{SufficiencyError, check_sufficiency};
-use calib_recording::detect::suspicion::suspicious_labels;
-use calib_recording::detect::verdict::Outcome;
-use calib_recording::detect::{self, DetectSettings};
+use calib_recording::detect::DetectSettings;
 use parts::Parts;
 
 /// How to calibrate. Nothing here needs to be chosen by the user. Poses are left out by the
@@ -57,37 +55,6 @@ impl Default for CalibrateSettings {
             ray_tables: false,
         }
     }
-}
-
-/// Corners of a dataset, and where they come from.
-#[derive(Debug)]
-pub struct Corners {
-    /// The views.
-    pub views: Vec<View>,
-    /// The verdicts per image, if the corners were detected and not read.
-    pub detection: Option<detect::Detection>,
-}
-
-/// Corners from `corners.csv` if there is one, else from the images.
-///
-/// # Errors
-/// Unreadable or inconsistent files; images that cannot be labelled.
-pub fn corners(
-    dataset: &Dataset,
-    settings: &DetectSettings,
-    progress: &dyn Progress,
-) -> Result<Corners, CalibrateError> {
-    if let Some(views) = load_corners(dataset)? {
-        return Ok(Corners {
-            views,
-            detection: None,
-        });
-    }
-    let detection = detect::detect_dataset(dataset, settings, progress)?;
-    Ok(Corners {
-        views: detection.views.clone(),
-        detection: Some(detection),
-    })
 }
 
 /// A calibration, and what its held-out check was made from.
@@ -207,80 +174,4 @@ pub fn calibrate_corners(
         own: solution.own,
         offered: observations,
     })
-}
-
-/// What a dataset offers to any method.
-#[derive(Debug)]
-pub struct Offered {
-    /// As the dataset has them.
-    pub views: Vec<View>,
-    /// Arranged for adjustment.
-    pub observations: Observations,
-}
-
-/// What a dataset offers to any method: its corners without the poses that the user leaves out.
-///
-/// # Errors
-/// A pose to leave out that is none; too few corners.
-pub fn offered(dataset: &Dataset, corners: &Corners) -> Result<Offered, CalibrateError> {
-    check_excluded(dataset, &corners.views)?;
-    let views = without_excluded(corners.views.clone(), &dataset.excluded_poses).used;
-    check_sufficiency(dataset, &views)
-        .map_err(|error| with_refusals(dataset, error, corners.detection.as_ref()))?;
-    let sensors = dataset.cameras.iter().map(|camera| camera.sensor).collect();
-    Ok(Offered {
-        observations: Observations::new(dataset.board, sensors, &views),
-        views,
-    })
-}
-
-/// Why no method had an answer: labels that contradict each other, if they explain it.
-pub fn explained(error: MethodError, dataset: &Dataset, used: &[View]) -> CalibrateError {
-    match suspicious_labels(dataset, used) {
-        Some(suspicion) => CalibrateError::Labels {
-            suspicion,
-            source: error,
-        },
-        None => error.into(),
-    }
-}
-
-/// Names of the cameras, in order.
-pub fn camera_names(dataset: &Dataset) -> Vec<String> {
-    dataset.cameras.iter().map(|c| c.name.clone()).collect()
-}
-
-/// Every pose that is left out must be one: a slip in a number would leave the bad pose in.
-fn check_excluded(dataset: &Dataset, views: &[View]) -> Result<(), NoSuchPose> {
-    let last_seen = views.iter().map(|view| view.pose).max();
-    let last_image = dataset.image_pose_count().checked_sub(1);
-    let last = last_seen.max(last_image).unwrap_or(0);
-    match dataset.excluded_poses.iter().find(|pose| **pose > last) {
-        Some(&pose) => Err(NoSuchPose { pose, last }),
-        None => Ok(()),
-    }
-}
-
-/// Too few corners, with the reason for which images were refused.
-fn with_refusals(
-    dataset: &Dataset,
-    source: SufficiencyError,
-    detection: Option<&detect::Detection>,
-) -> CalibrateError {
-    let images = detection.map_or(&[][..], |detection| &detection.images);
-    let mut refused = images.iter().filter_map(|image| match &image.outcome {
-        Outcome::Refused(reason) => Some((image, reason)),
-        Outcome::Used { .. } => None,
-    });
-    let Some((image, reason)) = refused.next() else {
-        return source.into();
-    };
-    let path = image.path.strip_prefix(&dataset.folder);
-    let path = path.unwrap_or(&image.path);
-    CalibrateError::FewImages {
-        first: format!("{}: {reason}", path.display()),
-        refused: 1 + refused.count(),
-        total: images.len(),
-        source,
-    }
 }

@@ -1,16 +1,16 @@
 //! `detect`: from a dataset's images to labelled corners, with a verdict on every image.
 
+use super::detect_image::{Found, ImageObject, Verdict, camera_name, in_words};
+use super::error::Error;
 use calib_rays::observed::View;
 use calib_rays::progress::Progress;
 use calib_recording::dataset::Dataset;
-use calib_recording::detect::overlay::{OverlayError, write_all};
+use calib_recording::detect::overlay::write_all;
 use calib_recording::detect::verdict::{ImageFigures, ImageVerdict, Outcome};
-use calib_recording::detect::{
-    DetectError, DetectSettings, Detection, PairCheck, TurnedImage, detect_dataset,
-};
+use calib_recording::detect::{DetectSettings, Detection, PairCheck, TurnedImage, detect_dataset};
 use clap::Args;
 use serde::Serialize;
-use std::fmt::Write as _;
+use std::fmt::{self, Display};
 use std::path::PathBuf;
 
 const EXAMPLE: &str = "\
@@ -51,18 +51,6 @@ pub struct DetectArgs {
     pub force: bool,
 }
 
-/// Why the command failed.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum DetectCommandError {
-    /// The images as a whole. Exit code 2 without images, else 3.
-    #[error(transparent)]
-    Detect(#[from] DetectError),
-    /// An overlay could not be written. Exit code 2.
-    #[error(transparent)]
-    Overlay(#[from] OverlayError),
-}
-
 /// What the command found.
 #[derive(Debug)]
 pub struct DetectReport {
@@ -76,26 +64,13 @@ pub struct DetectReport {
 #[derive(Debug, Serialize)]
 pub struct DetectObject {
     schema: &'static str,
-    images: Vec<ImageObject>,
+    images: Vec<ImageObject<FiguresObject>>,
     turned: Vec<TurnedObject>,
     pair_checks: Vec<PairObject>,
     /// Images with corners.
     pub used: usize,
     /// Corners in all of them.
     pub corner_count: usize,
-}
-
-#[derive(Debug, Serialize)]
-struct ImageObject {
-    camera: String,
-    pose: usize,
-    file: PathBuf,
-    verdict: &'static str,
-    corner_count: usize,
-    partial: bool,
-    quarter_turns: Option<u8>,
-    reason: Option<String>,
-    figures: Option<FiguresObject>,
 }
 
 #[derive(Debug, Serialize)]
@@ -127,12 +102,12 @@ struct PairObject {
 /// Finds the corners and writes the overlays that are asked for; `corners.csv` is the caller's.
 ///
 /// # Errors
-/// [`DetectCommandError`].
+/// That of the detection, [`Error::Overlay`].
 pub fn run(
     args: &DetectArgs,
     dataset: &Dataset,
     progress: &dyn Progress,
-) -> Result<DetectReport, DetectCommandError> {
+) -> Result<DetectReport, Error> {
     let detection = detect_dataset(dataset, &DetectSettings::default(), progress)?;
     if let Some(folder) = &args.overlay {
         write_all(folder, dataset, &detection, progress)?;
@@ -146,10 +121,7 @@ pub fn run(
 
 impl DetectObject {
     fn new(dataset: &Dataset, detection: &Detection) -> Self {
-        let name = |camera_idx: usize| {
-            let camera = dataset.cameras.get(camera_idx);
-            camera.map_or_else(|| camera_idx.to_string(), |c| c.name.clone())
-        };
+        let name = |camera_idx| camera_name(dataset, camera_idx);
         let turned = |turned: &TurnedImage| TurnedObject {
             camera: name(turned.camera_idx),
             pose: turned.pose,
@@ -163,7 +135,7 @@ impl DetectObject {
             worst_pose: check.worst_pose,
             worst_px: check.worst_px,
         };
-        let image = |image: &ImageVerdict| ImageObject::new(image, name(image.camera_idx));
+        let image = |image: &ImageVerdict| image_object(image, name(image.camera_idx));
         Self {
             schema: "calib-offline/detect/1",
             images: detection.images.iter().map(image).collect(),
@@ -176,92 +148,76 @@ impl DetectObject {
 
     /// The report in words: a line per image, then what stands out.
     pub fn in_words(&self) -> String {
-        let mut text = String::new();
-        for image in &self.images {
-            // Writing to a string cannot fail.
-            let _ = writeln!(text, "{}", image.in_words());
-        }
-        for turned in &self.turned {
-            let degrees = i32::from(turned.quarter_turns) * 90;
-            let _ = writeln!(
-                text,
-                "turned: {} pose {} by {} degrees against most images",
-                turned.camera,
-                turned.pose,
-                if degrees > 180 {
-                    degrees - 360
-                } else {
-                    degrees
-                }
-            );
-        }
-        for pair in &self.pair_checks {
-            let _ = writeln!(
-                text,
-                "{} and {} agree to {:.2} px (median distance from epipolar lines, {} poses; \
-                 worst pose {}: {:.2} px)",
-                pair.first_camera,
-                pair.second_camera,
-                pair.median_px,
-                pair.poses,
-                pair.worst_pose,
-                pair.worst_px
-            );
-        }
-        let _ = write!(
-            text,
-            "{} of {} images used, {} corners",
-            self.used,
-            self.images.len(),
-            self.corner_count
-        );
-        text
+        let turned = self.turned.iter().map(TurnedObject::in_words);
+        let remarks = turned.chain(self.pair_checks.iter().map(PairObject::in_words));
+        let found = Found::Corners(self.corner_count);
+        in_words(&self.images, remarks, self.used, found)
     }
 }
 
-impl ImageObject {
-    fn new(image: &ImageVerdict, camera: String) -> Self {
-        let (corner_count, partial, quarter_turns, reason) = match &image.outcome {
-            Outcome::Used {
-                corner_count,
-                partial,
-                quarter_turns,
-            } => (*corner_count, *partial, Some(*quarter_turns), None),
-            Outcome::Refused(refusal) => (0, false, None, Some(refusal.to_string())),
-        };
-        let verdict = if reason.is_none() { "ok" } else { "refused" };
-        Self {
-            camera,
-            pose: image.pose,
-            file: image.path.clone(),
-            verdict,
+impl TurnedObject {
+    fn in_words(&self) -> String {
+        let degrees = i32::from(self.quarter_turns) * 90;
+        format!(
+            "turned: {} pose {} by {} degrees against most images",
+            self.camera,
+            self.pose,
+            if degrees > 180 {
+                degrees - 360
+            } else {
+                degrees
+            }
+        )
+    }
+}
+
+impl PairObject {
+    fn in_words(&self) -> String {
+        format!(
+            "{} and {} agree to {:.2} px (median distance from epipolar lines, {} poses; \
+             worst pose {}: {:.2} px)",
+            self.first_camera,
+            self.second_camera,
+            self.median_px,
+            self.poses,
+            self.worst_pose,
+            self.worst_px
+        )
+    }
+}
+
+fn image_object(image: &ImageVerdict, camera: String) -> ImageObject<FiguresObject> {
+    let (corner_count, partial, quarter_turns, reason) = match &image.outcome {
+        Outcome::Used {
             corner_count,
             partial,
             quarter_turns,
-            reason,
-            figures: image.figures.as_ref().map(FiguresObject::from),
-        }
+        } => (*corner_count, *partial, Some(*quarter_turns), None),
+        Outcome::Refused(refusal) => (0, false, None, Some(refusal.to_string())),
+    };
+    ImageObject {
+        camera,
+        pose: image.pose,
+        file: image.path.clone(),
+        verdict: match reason {
+            None => Verdict::Ok,
+            Some(_) => Verdict::Refused,
+        },
+        found: Found::Corners(corner_count),
+        partial,
+        quarter_turns,
+        reason,
+        figures: image.figures.as_ref().map(FiguresObject::from),
     }
+}
 
-    fn in_words(&self) -> String {
-        let file = self.file.file_name().unwrap_or_default().to_string_lossy();
-        let head = format!("{} pose {} ({file}): ", self.camera, self.pose);
-        match (&self.reason, &self.figures) {
-            (Some(reason), _) => format!("{head}refused: {reason}"),
-            (None, None) => format!("{head}{} corners", self.corner_count),
-            (None, Some(figures)) => format!(
-                "{head}{} corners{}, contrast {:.0} %, edges {:.1} px wide, sigma {:.3} px",
-                self.corner_count,
-                if self.partial {
-                    " (part of the board)"
-                } else {
-                    ""
-                },
-                figures.contrast_percent,
-                figures.edge_px,
-                figures.sigma_px
-            ),
-        }
+impl Display for FiguresObject {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let (contrast, edge, sigma) = (self.contrast_percent, self.edge_px, self.sigma_px);
+        write!(
+            f,
+            "contrast {contrast:.0} %, edges {edge:.1} px wide, sigma {sigma:.3} px"
+        )
     }
 }
 

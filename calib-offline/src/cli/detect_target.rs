@@ -2,6 +2,7 @@
 //! verdict on every image.
 
 use super::detect::DetectArgs;
+use super::detect_image::{Found, ImageObject, Verdict, camera_name, in_words};
 use super::error::Error;
 use calib_rays::observed::View;
 use calib_rays::progress::Progress;
@@ -11,8 +12,7 @@ use calib_recording::detect::ring_target::{
     overlay::write_all,
 };
 use serde::Serialize;
-use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::fmt::{self, Display};
 
 /// What the command found.
 #[derive(Debug)]
@@ -27,24 +27,11 @@ pub struct TargetReport {
 #[derive(Debug, Serialize)]
 pub struct TargetObject {
     schema: &'static str,
-    images: Vec<ImageObject>,
+    images: Vec<ImageObject<FiguresObject>>,
     /// Images with markers.
     pub used: usize,
     /// Markers in all of them.
     pub marker_count: usize,
-}
-
-#[derive(Debug, Serialize)]
-struct ImageObject {
-    camera: String,
-    pose: usize,
-    file: PathBuf,
-    verdict: &'static str,
-    marker_count: usize,
-    partial: bool,
-    quarter_turns: Option<u8>,
-    reason: Option<String>,
-    figures: Option<FiguresObject>,
 }
 
 #[derive(Debug, Serialize)]
@@ -83,11 +70,8 @@ pub fn run(
 
 impl TargetObject {
     fn new(dataset: &Dataset, detection: &TargetDetection) -> Self {
-        let image = |image: &TargetImage| {
-            let camera = dataset.cameras.get(image.camera_idx);
-            let name = camera.map_or_else(|| image.camera_idx.to_string(), |c| c.name.clone());
-            ImageObject::new(image, name)
-        };
+        let image =
+            |image: &TargetImage| image_object(image, camera_name(dataset, image.camera_idx));
         Self {
             schema: "calib-offline/detect-target/1",
             images: detection.images.iter().map(image).collect(),
@@ -98,59 +82,33 @@ impl TargetObject {
 
     /// The report in words: a line per image.
     pub fn in_words(&self) -> String {
-        let mut text = String::new();
-        for image in &self.images {
-            // Writing to a string cannot fail.
-            let _ = writeln!(text, "{}", image.in_words());
-        }
-        let _ = write!(
-            text,
-            "{} of {} images used, {} markers",
-            self.used,
-            self.images.len(),
-            self.marker_count
-        );
-        text
+        let found = Found::Markers(self.marker_count);
+        in_words(&self.images, None, self.used, found)
     }
 }
 
-impl ImageObject {
-    fn new(image: &TargetImage, camera: String) -> Self {
-        let located = image.outcome.as_ref();
-        Self {
-            camera,
-            pose: image.pose,
-            file: image.path.clone(),
-            verdict: if located.is_ok() { "ok" } else { "refused" },
-            marker_count: located.map_or(0, |located| located.markers.len()),
-            partial: image.figures.is_some_and(|figures| figures.partial),
-            quarter_turns: located.ok().map(|located| located.quarter_turns),
-            reason: located.err().map(ToString::to_string),
-            figures: image.figures.as_ref().map(FiguresObject::from),
-        }
+fn image_object(image: &TargetImage, camera: String) -> ImageObject<FiguresObject> {
+    let located = image.outcome.as_ref();
+    ImageObject {
+        camera,
+        pose: image.pose,
+        file: image.path.clone(),
+        verdict: located.map_or(Verdict::Refused, |_| Verdict::Ok),
+        found: Found::Markers(located.map_or(0, |located| located.markers.len())),
+        partial: image.figures.is_some_and(|figures| figures.partial),
+        quarter_turns: located.ok().map(|located| located.quarter_turns),
+        reason: located.err().map(ToString::to_string),
+        figures: image.figures.as_ref().map(FiguresObject::from),
     }
+}
 
-    fn in_words(&self) -> String {
-        let file = self.file.file_name().unwrap_or_default().to_string_lossy();
-        let head = format!("{} target pose {} ({file}): ", self.camera, self.pose);
-        match (&self.reason, &self.figures) {
-            (Some(reason), _) => format!("{head}refused: {reason}"),
-            (None, None) => format!("{head}{} markers", self.marker_count),
-            (None, Some(figures)) => format!(
-                "{head}{} markers{}, contrast {:.0} %, edges {:.1} px wide, sigma {:.4} px, \
-                 perspective {:.3} px",
-                self.marker_count,
-                if self.partial {
-                    " (part of the target)"
-                } else {
-                    ""
-                },
-                figures.contrast_percent,
-                figures.edge_px,
-                figures.sigma_px,
-                figures.perspective_px
-            ),
-        }
+impl Display for FiguresObject {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(
+            f,
+            "contrast {:.0} %, edges {:.1} px wide, sigma {:.4} px, perspective {:.3} px",
+            self.contrast_percent, self.edge_px, self.sigma_px, self.perspective_px
+        )
     }
 }
 

@@ -8,7 +8,7 @@ use super::place::check_file;
 use super::rig_file::{RigFile, open};
 use super::usage_error::UsageError;
 use crate::device::{DeviceSource, connect};
-use crate::report::text::short;
+use crate::present::numbers::short;
 use calib_blob::matches::{
     BlobSource, MatchesError, MeasureSummary, POINTS_HEADER, StreamError, measure_batches,
     measure_stream,

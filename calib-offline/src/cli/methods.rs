@@ -103,7 +103,7 @@ fn write(folder: &Path, comparison: &Comparison) -> Result<(), Error> {
     json.push(b'\n');
     let csv = words::csv(comparison);
     let page = words::markdown(comparison);
-    let contents = [json.as_slice(), csv.as_slice(), page.as_bytes()];
+    let contents = [json.as_slice(), csv.as_bytes(), page.as_bytes()];
     let existed = folder.exists();
     make_folder(folder)?;
     let set: Vec<(PathBuf, &[u8])> = FILES

@@ -5,8 +5,8 @@ use super::calibrate::{BLOB_MAX_ERROR_PX, pack_settings};
 use super::error::Error;
 use super::output::Console;
 use super::place::check_file;
+use crate::present::numbers::short;
 use crate::report::Calibration;
-use crate::report::text::short;
 use calib_blob::pack::{
     CurvePoint, Deviation, LOOSEST_PX, PackSettings, Prefer, pack, pack_within_bytes,
 };

@@ -1,13 +1,13 @@
 //! `detect` and `simulate` on the console: where `corners.csv` goes, and how the outcome is told.
 
 use super::Outcome;
-use super::detect::{DetectArgs, DetectCommandError, run as run_detect};
+use super::detect::{DetectArgs, run as run_detect};
 use super::detect_target::run as run_detect_target;
 use super::error::Error;
 use super::output::Console;
 use super::simulate::{SimulateArgs, SimulateSummary, run as run_simulate};
 use super::usage_error::UsageError;
-use crate::report::text::short;
+use crate::present::numbers::short;
 use calib_recording::atomic_file::{check_folder, check_place};
 use calib_recording::dataset::{Dataset, SufficiencyError, write_corners};
 use serde::Serialize;
@@ -24,10 +24,7 @@ pub(super) fn detect(args: &DetectArgs, console: &Console) -> Result<Outcome, Er
     }
     let path = dataset.corners_path();
     check_output(args, &path)?;
-    let report = run_detect(args, &dataset, console.progress()).map_err(|error| match error {
-        DetectCommandError::Detect(error) => Error::from(error),
-        DetectCommandError::Overlay(error) => error.into(),
-    })?;
+    let report = run_detect(args, &dataset, console.progress())?;
     if report.views.is_empty() {
         console.narrate(&report.object.in_words());
         return Err(SufficiencyError::NoCorners.into());

@@ -2,7 +2,7 @@
 
 use super::bootstrap::Ratio;
 use super::record::{Comparison, HeldOutFigures, MethodFigures, Ratios};
-use crate::report::text::short;
+use crate::present::numbers::short;
 
 /// A difference by less than this share matters to nobody, however certain it is.
 const MATTERS: f64 = 0.05;

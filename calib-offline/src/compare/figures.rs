@@ -2,8 +2,9 @@
 
 use super::answer::Answer;
 use super::boards::{BoardScore, FoldScores, score_fold};
+use super::bootstrap;
 use super::record::{HeldOutFigures, MethodFigures, Ratios, Training, TruthFigures};
-use super::{Run, bootstrap};
+use super::run::Run;
 use crate::evaluate::Folds;
 use crate::evaluate::held_out::{BoardErrors, Fold};
 use crate::evaluate::known_points::{Points, beside_truth, compare_with_truth, measure};

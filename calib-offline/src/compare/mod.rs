@@ -11,30 +11,22 @@ mod example;
 mod figures;
 pub mod publication;
 pub mod record;
+mod run;
 pub mod words;
 
 pub use error::CompareError;
 pub use record::{Comparison, MethodFigures, SCHEMA};
 
-use crate::evaluate::Folds;
 use crate::evaluate::held_out::folds_wanted;
-use crate::methods::{Given, Joint, METHODS, Method, MethodError, Screened, fit_folds};
+use crate::methods::{Joint, METHODS, Method, Screened};
 use crate::pipeline::{Corners, camera_names, explained, offered};
-use answer::Answer;
 use calib_blob::matches::read_known;
-use calib_rays::progress::{Progress, Silent};
+use calib_rays::progress::Progress;
 use calib_recording::dataset::identity::input_sha256;
 use calib_recording::dataset::{Dataset, stage};
 use figures::{add_held_out, add_training, add_truth, without_outliers, working_distance_mm};
-use std::time::{Duration, Instant};
-
-/// A method and what came of it.
-struct Run<'a> {
-    method: &'a dyn Method,
-    answer: Result<Answer, MethodError>,
-    folds: Folds,
-    time: Duration,
-}
+use run::Run;
+use std::time::Instant;
 
 /// Compares all methods on a dataset with so many folds; 0 leaves held-out boards out.
 ///
@@ -84,7 +76,7 @@ pub fn compare_methods(
         .iter()
         .map(|method| {
             progress.begin(method.title(), folds);
-            let run = run(*method, &given, folds, progress);
+            let run = Run::new(*method, &given, folds, progress);
             progress.end();
             run
         })
@@ -94,7 +86,7 @@ pub fn compare_methods(
     {
         return Err(explained(error.clone(), dataset, &offered.views).into());
     }
-    let mut rows: Vec<MethodFigures> = runs.iter().map(empty_row).collect();
+    let mut rows: Vec<MethodFigures> = runs.iter().map(Run::empty_row).collect();
     for row in &mut rows {
         // The screening is the joint estimate's own.
         if row.method == Joint.name() {
@@ -125,37 +117,4 @@ pub fn compare_methods(
     };
     comparison.conclusion = conclusion::conclude(&comparison);
     Ok(comparison)
-}
-
-fn run<'a>(
-    method: &'a dyn Method,
-    given: &Given,
-    folds: usize,
-    progress: &dyn Progress,
-) -> Run<'a> {
-    let began = Instant::now();
-    let solution = method.fit(given, &Silent);
-    let folds = if solution.is_ok() { folds } else { 0 };
-    Run {
-        method,
-        answer: solution.map(|solution| Answer::new(solution, given.observations)),
-        folds: fit_folds(method, given, given.observations, folds, progress),
-        time: began.elapsed(),
-    }
-}
-
-fn empty_row(run: &Run) -> MethodFigures {
-    let answer = run.answer.as_ref();
-    MethodFigures {
-        method: run.method.name(),
-        title: run.method.title(),
-        failure: answer.err().map(MethodError::reason),
-        training: None,
-        conversion_error_px: answer.ok().map(|answer| answer.conversion_error_px),
-        failed_folds: run.folds.failed.clone(),
-        held_out: None,
-        against_first: None,
-        truth: Vec::new(),
-        time: run.time,
-    }
 }

@@ -1,8 +1,8 @@
 //! A comparison as a table for the terminal, as Markdown, and as CSV.
 
 use super::record::{Comparison, HeldOutFigures, MethodFigures};
-use crate::report::text::short;
-use std::fmt::Write as _;
+use crate::present::numbers::{or_dash, or_empty, short};
+use crate::present::table::Table;
 
 /// Columns of the table, before those of the truth.
 const COLUMNS: [&str; 10] = [
@@ -27,104 +27,54 @@ const CSV_COLUMNS: &str = "method,failure,fitted_rms_px,fitted_corners,rejected,
 
 /// For the terminal.
 pub fn text(comparison: &Comparison) -> String {
-    let table = table(comparison);
-    let widths: Vec<usize> = (0..table[0].len())
-        .map(|k| {
-            table
-                .iter()
-                .map(|row| row[k].chars().count())
-                .max()
-                .unwrap_or(0)
-        })
-        .collect();
-    let mut text = facts(comparison) + "\n\n";
-    for row in &table {
-        let mut line = String::new();
-        for (k, (cell, &width)) in row.iter().zip(&widths).enumerate() {
-            // Writing to a String cannot fail.
-            let _ = if k == 0 {
-                write!(line, "{cell:<width$}")
-            } else {
-                write!(line, "  {cell:>width$}")
-            };
-        }
-        text += line.trim_end();
-        text += "\n";
-    }
-    text += "\n";
-    for line in failures(comparison).iter().chain(&comparison.conclusion) {
-        text += line;
-        text += "\n";
-    }
-    text
+    let lines: String = remarks(comparison).map(|line| line + "\n").collect();
+    let table = table(comparison).text();
+    format!("{}\n\n{table}\n{lines}", facts(comparison))
 }
 
 /// As a Markdown document.
 pub fn markdown(comparison: &Comparison) -> String {
-    let mut text = format!("# Methods compared\n\n{}\n\n", facts(comparison));
-    for (k, row) in table(comparison).iter().enumerate() {
-        let cells: Vec<String> = row.iter().map(|cell| cell.replace('|', "\\|")).collect();
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "| {} |", cells.join(" | "));
-        if k == 0 {
-            let _ = writeln!(text, "| --- |{}", " ---: |".repeat(row.len() - 1));
-        }
-    }
-    text += "\n";
-    for line in failures(comparison).iter().chain(&comparison.conclusion) {
-        let _ = writeln!(text, "- {line}");
-    }
-    text
+    let lines: String = remarks(comparison)
+        .map(|line| "- ".to_owned() + &line + "\n")
+        .collect();
+    let table = table(comparison).markdown();
+    format!(
+        "# Methods compared\n\n{}\n\n{table}\n{lines}",
+        facts(comparison)
+    )
 }
 
 /// As CSV, one row per method; a figure that does not apply is empty.
-pub fn csv(comparison: &Comparison) -> Vec<u8> {
-    let mut text = String::new();
+pub fn csv(comparison: &Comparison) -> String {
     let files = truth_files(comparison);
-    let mut header: Vec<String> = CSV_COLUMNS
-        .split(',')
-        .map(|name| name.trim().to_owned())
-        .collect();
-    for file in &files {
+    let of_files = files.iter().flat_map(|file| {
         let stem = file.trim_end_matches(".csv");
-        header.extend(["rms_mm", "over_oracle", "unanswered"].map(|what| format!("{stem}_{what}")));
+        ["rms_mm", "over_oracle", "unanswered"].map(|what| format!("{stem}_{what}"))
+    });
+    let header = CSV_COLUMNS.split(',').map(str::to_owned);
+    let mut table = Table::new(header.chain(of_files));
+    for method in &comparison.methods {
+        table.push(csv_row(method, &files));
     }
-    let rows = comparison.methods.iter().map(|m| csv_row(m, &files));
-    for row in std::iter::once(header).chain(rows) {
-        let fields: Vec<String> = row.iter().map(|field| quoted(field)).collect();
-        text += &fields.join(",");
-        text += "\n";
-    }
-    text.into_bytes()
-}
-
-/// A field as CSV has it: in quotes where it would be taken for several.
-fn quoted(field: &str) -> String {
-    if field.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", field.replace('"', "\"\""))
-    } else {
-        field.to_owned()
-    }
+    table.csv()
 }
 
 fn csv_row(method: &MethodFigures, files: &[&str]) -> Vec<String> {
-    let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
-    let count = |value: Option<usize>| value.map_or_else(String::new, |value| value.to_string());
     let held = method.held_out.as_ref();
     let training = method.training.as_ref();
     let mut row = vec![
         method.method.to_owned(),
         method.failure.clone().unwrap_or_default(),
-        number(training.map(|t| t.rms_px)),
-        count(training.map(|t| t.corners)),
-        count(training.map(|t| t.rejected)),
-        number(held.and_then(|h| h.rms_px)),
-        number(held.and_then(|h| h.median_px)),
-        number(held.and_then(|h| h.neighbor_rms_percent)),
-        number(held.and_then(|h| h.neighbor_rms_mm)),
-        number(held.and_then(|h| h.rigid_rms_mm)),
-        count(held.map(|h| h.points)),
-        count(held.map(|h| h.unanswered)),
+        or_empty(training.map(|t| t.rms_px)),
+        or_empty(training.map(|t| t.corners)),
+        or_empty(training.map(|t| t.rejected)),
+        or_empty(held.and_then(|h| h.rms_px)),
+        or_empty(held.and_then(|h| h.median_px)),
+        or_empty(held.and_then(|h| h.neighbor_rms_percent)),
+        or_empty(held.and_then(|h| h.neighbor_rms_mm)),
+        or_empty(held.and_then(|h| h.rigid_rms_mm)),
+        or_empty(held.map(|h| h.points)),
+        or_empty(held.map(|h| h.unanswered)),
     ];
     let ratios = method.against_first.as_ref();
     for ratio in [
@@ -133,18 +83,18 @@ fn csv_row(method: &MethodFigures, files: &[&str]) -> Vec<String> {
         ratios.and_then(|r| r.rigid),
     ] {
         row.extend([
-            number(ratio.map(|r| r.ratio)),
-            number(ratio.map(|r| r.low)),
-            number(ratio.map(|r| r.high)),
+            or_empty(ratio.map(|r| r.ratio)),
+            or_empty(ratio.map(|r| r.low)),
+            or_empty(ratio.map(|r| r.high)),
         ]);
     }
     for file in files {
         let own = method.truth.iter().find(|set| set.file == *file);
         let errors = own.and_then(|set| set.errors.as_ref());
         row.extend([
-            number(errors.map(|e| e.placed_rms_mm)),
-            number(errors.map(|e| e.placed_ratio)),
-            count(own.map(|set| set.unanswered)),
+            or_empty(errors.map(|e| e.placed_rms_mm)),
+            or_empty(errors.map(|e| e.placed_ratio)),
+            or_empty(own.map(|set| set.unanswered)),
         ]);
     }
     row
@@ -189,22 +139,20 @@ fn truth_files(comparison: &Comparison) -> Vec<&str> {
     files
 }
 
-/// Header and one row per method.
-fn table(comparison: &Comparison) -> Vec<Vec<String>> {
+/// One row per method.
+fn table(comparison: &Comparison) -> Table {
     let files = truth_files(comparison);
-    let mut header: Vec<String> = COLUMNS.map(str::to_owned).into();
-    header.extend(
-        files
-            .iter()
-            .map(|file| format!("{} mm (x oracle)", file.trim_end_matches(".csv"))),
-    );
-    let rows = comparison.methods.iter().map(|method| row(method, &files));
-    std::iter::once(header).chain(rows).collect()
+    let of_file = |file: &&str| format!("{} mm (x oracle)", file.trim_end_matches(".csv"));
+    let header = COLUMNS.map(str::to_owned).into_iter();
+    let mut table = Table::new(header.chain(files.iter().map(of_file)));
+    for method in &comparison.methods {
+        table.push(row(method, &files));
+    }
+    table
 }
 
 fn row(method: &MethodFigures, files: &[&str]) -> Vec<String> {
-    let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), short);
-    let count = |value: Option<usize>| value.map_or_else(|| "-".to_owned(), |n| n.to_string());
+    let number = |value: Option<f64>| or_dash(value.map(short));
     let held = method.held_out.as_ref();
     let of = |value: fn(&HeldOutFigures) -> Option<f64>| number(held.and_then(value));
     let mut row = vec![
@@ -215,18 +163,22 @@ fn row(method: &MethodFigures, files: &[&str]) -> Vec<String> {
         of(|h| h.neighbor_rms_percent),
         of(|h| h.neighbor_rms_mm),
         of(|h| h.rigid_rms_mm),
-        count(held.map(|h| h.points)),
-        count(held.map(|h| h.unanswered)),
-        count(method.training.map(|t| t.rejected)),
+        or_dash(held.map(|h| h.points)),
+        or_dash(held.map(|h| h.unanswered)),
+        or_dash(method.training.map(|t| t.rejected)),
     ];
     row.extend(files.iter().map(|file| {
         let own = method.truth.iter().find(|set| set.file == *file);
-        own.and_then(|set| set.errors.as_ref()).map_or_else(
-            || "-".to_owned(),
-            |e| format!("{} ({:.3})", short(e.placed_rms_mm), e.placed_ratio),
-        )
+        let errors = own.and_then(|set| set.errors.as_ref());
+        or_dash(errors.map(|e| format!("{} ({:.3})", short(e.placed_rms_mm), e.placed_ratio)))
     }));
     row
+}
+
+/// What stands below the table.
+fn remarks(comparison: &Comparison) -> impl Iterator<Item = String> {
+    let conclusion = comparison.conclusion.iter().cloned();
+    failures(comparison).into_iter().chain(conclusion)
 }
 
 /// Methods and folds without an answer, and why.
@@ -270,7 +222,7 @@ mod tests {
                 assert!(form.contains(part), "{part}:\n{form}");
             }
         }
-        let csv = String::from_utf8(csv(&comparison)).unwrap();
+        let csv = csv(&comparison);
         let fields: Vec<usize> = csv.lines().map(|line| line.split(',').count()).collect();
         assert_eq!(fields, [24, 24, 24]);
         assert!(csv.contains("matches_over_oracle"));

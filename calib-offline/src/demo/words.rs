@@ -3,7 +3,7 @@
 use super::unseen::BoardFigures;
 use super::{DeviceCheck, Measured, UnseenBoards};
 use crate::evaluate::known_points::KnownPoints;
-use crate::report::text::short;
+use crate::present::numbers::short;
 
 /// Name and fact, one pair per line.
 pub fn lines(measured: &Measured) -> Vec<(String, String)> {

@@ -1,14 +1,11 @@
 //! The views that all methods are given when they are compared.
 
-use super::{Given, MethodError};
+use super::MethodError;
+use super::method::{Given, JointFound};
 use calib_estimate::adjust::Observations;
 use calib_estimate::init::rig::start_rig;
-use calib_estimate::init::screening::Finding;
-use calib_estimate::joint::{Estimate, estimate_screened};
+use calib_estimate::joint::estimate_screened;
 use std::collections::BTreeMap;
-
-/// A joint estimate, and what was found wrong with views on the way.
-pub type JointFound = (Estimate, Vec<Finding>);
 
 /// Views that agree with each other, as the joint estimate finds them.
 #[derive(Debug)]

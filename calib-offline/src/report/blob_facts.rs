@@ -1,6 +1,6 @@
 //! What is said of the blob that was written beside a report.
 
-use super::text::short;
+use crate::present::numbers::short;
 use calib_blob::pack::{CurvePoint, Packed};
 use serde::Serialize;
 

@@ -1,9 +1,9 @@
 //! The page's section on what the estimate chose by itself, and what a central model would cost.
 
 use super::record::{Calibration, ChoicesRecord};
-use super::text::short;
 use super::words;
 use crate::evaluate::CrossChecks;
+use crate::present::numbers::short;
 use calib_estimate::joint::Family;
 use calib_estimate::joint::choice::NEEDED_GAIN;
 use maud::{Markup, html};

@@ -10,9 +10,9 @@ use super::plot::{
 };
 use super::procedure;
 use super::record::{Calibration, HeldOutRecord};
-use super::text::short;
 use super::words;
 use crate::evaluate::half_data::HalfDataCheck;
+use crate::present::numbers::short;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// The page as a file's content.

@@ -1,7 +1,7 @@
 //! How the published procedure went, in words: for the summary and the page.
 
 use super::record::{AlternatingRecord, Calibration};
-use super::text::short;
+use crate::present::numbers::short;
 use calib_estimate::alternating::start::StartKind;
 use maud::{Markup, html};
 

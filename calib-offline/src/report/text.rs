@@ -5,6 +5,7 @@ use super::facts::Facts;
 use super::procedure;
 use super::record::Calibration;
 use super::words;
+use crate::present::numbers::short;
 use std::fmt::Write as _;
 
 /// A few lines, each with one fact and its unit; no colors.
@@ -139,43 +140,11 @@ fn held_out(calibration: &Calibration, facts: &Facts) -> String {
     )
 }
 
-/// Three significant digits without an exponent where that stays short.
-pub fn short(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    let magnitude = value.abs().log10().floor() as i32;
-    if (-4..6).contains(&magnitude) {
-        let decimals = (2 - magnitude).max(0) as usize;
-        format!("{value:.decimals$}")
-    } else {
-        format!("{value:.2e}")
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::report::example;
     use crate::report::record::FailedFold;
-
-    #[test]
-    fn three_digits_are_shown_at_any_size() {
-        let cases = [
-            (0.0, "0"),
-            (0.05, "0.0500"),
-            (1.2345, "1.23"),
-            (123.456, "123"),
-            (98765.4, "98765"),
-            (0.00012345, "0.000123"),
-            (1.5e-9, "1.50e-9"),
-            (2.5e9, "2.50e9"),
-            (f64::NAN, "NaN"),
-        ];
-        for (value, expected) in cases {
-            assert_eq!(short(value), expected);
-        }
-    }
 
     #[test]
     fn the_summary_has_every_fact_with_its_unit() {

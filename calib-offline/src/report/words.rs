@@ -1,10 +1,10 @@
 //! Choices and checks of the record in plain words, for the terminal and the page alike.
 
 use super::record::{Calibration, ChoicesRecord};
-use super::text::short;
 use crate::evaluate::central_model::CentralModel;
 use crate::evaluate::centrality::Centrality;
 use crate::evaluate::half_data::{HalfData, HalfDataCheck, Skipped};
+use crate::present::numbers::short;
 use calib_estimate::joint::{Alternative, Choice, Family};
 use calib_rays::field::structured::OFFSET_CORE_DEGREE;
 

@@ -111,6 +111,11 @@ fn a_simulated_recording_has_every_part_and_joint_is_near_the_oracle() {
         .map(|(_, t)| t.lines().count())
         .collect();
     assert_eq!(rows[..3], [1 + 7 + 9, 1 + 3 * 18, 1 + target.common]);
+    for (name, table) in tables(&found) {
+        let fields = table.lines().map(|line| line.split(',').count());
+        let fields: Vec<usize> = fields.collect();
+        assert!(fields.iter().all(|count| *count == fields[0]), "{name}");
+    }
     let words = text(&[found]);
     assert!(words.contains("0.037") && words.contains("What cannot"));
 }

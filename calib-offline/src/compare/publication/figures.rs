@@ -6,8 +6,8 @@ use super::spread::{PUBLISHED_CHOICE_PX, SpreadExperiment, SpreadPoint};
 use super::stage::StageExperiment;
 use super::target::{CloudPoint, TargetExperiment, TargetMethod, TargetPose};
 use crate::methods::METHODS;
-use crate::report::plot::axes::round_up;
-use crate::report::plot::chart::{Axis, Mark, PLOT, Panel, Series, draw};
+use crate::present::axes::round_up;
+use crate::present::chart::{Axis, Mark, PLOT, Panel, Series, draw};
 
 /// Name and content of every figure that there is.
 pub fn figures(evaluation: &Evaluation) -> Vec<(&'static str, String)> {

@@ -25,6 +25,8 @@ pub mod target;
 pub mod words;
 
 pub use error::ExperimentError;
+pub use runs::MethodOutcome;
+pub use spread::ExperimentSettings;
 
 use crate::methods::Screened;
 use crate::pipeline::{self, camera_names, explained, offered};
@@ -36,27 +38,6 @@ use calib_recording::detect::DetectSettings;
 use runs::MethodRun;
 use serde::Serialize;
 use std::path::PathBuf;
-
-/// How much is tried. The default is the publication's.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ExperimentSettings {
-    /// Networks from 1000 to 7000 px, spread by spread.
-    pub spreads: usize,
-    /// Spreads from 100 px on.
-    pub wide_spreads: usize,
-    /// Views that the networks' errors are taken over, at most.
-    pub views: usize,
-}
-
-impl Default for ExperimentSettings {
-    fn default() -> Self {
-        Self {
-            spreads: 700,
-            wide_spreads: 60,
-            views: 4,
-        }
-    }
-}
 
 /// What was found on a dataset.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -83,17 +64,6 @@ pub struct Evaluation {
     pub known_points: Option<known::KnownExperiment>,
     /// What could not be done.
     pub left_out: Vec<LeftOut>,
-}
-
-/// What came of a method.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct MethodOutcome {
-    /// Its name.
-    pub method: &'static str,
-    /// Poses that it placed.
-    pub placed_poses: usize,
-    /// Why there is nothing of it.
-    pub failed: Option<String>,
 }
 
 /// A part of the experiments that could not be done.

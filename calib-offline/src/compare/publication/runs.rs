@@ -1,12 +1,12 @@
 //! All methods on the same corners, brought to one frame, and what they measure there.
 
-use super::MethodOutcome;
 use crate::evaluate::known_points::Points;
 use crate::methods::{Given, METHODS, MethodError, Solution};
 use calib_rays::geometry::RigidTransform;
 use calib_rays::measure::Sighting;
 use calib_rays::progress::Silent;
 use nalgebra::Vector3;
+use serde::Serialize;
 
 /// A solution in the frame of the board at a pose that all methods placed.
 #[derive(Debug)]
@@ -63,6 +63,17 @@ impl InDatum {
             *place = datum_from_rig.point(place);
         }
     }
+}
+
+/// What came of a method.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MethodOutcome {
+    /// Its name.
+    pub method: &'static str,
+    /// Poses that it placed.
+    pub placed_poses: usize,
+    /// Why there is nothing of it.
+    pub failed: Option<String>,
 }
 
 /// A method with what came of it.

@@ -1,7 +1,6 @@
 //! Error of the networks against their spread (publication, Fig. 7), as published: without a
 //! homography before them. Beyond the publication: spreads below 1000 px, and corners left out.
 
-use super::ExperimentSettings;
 use super::auxiliary::{SIDE_MM, seen_markers};
 use calib_estimate::adjust::Observations;
 use calib_estimate::adjust::observations::ViewBlock;
@@ -20,6 +19,27 @@ pub const PUBLISHED_PX: [f64; 2] = [1000.0, 7000.0];
 pub const PUBLISHED_CHOICE_PX: f64 = 6000.0;
 /// Where the wide range begins, px.
 pub const WIDE_FROM_PX: f64 = 100.0;
+
+/// How much is tried. The default is the publication's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ExperimentSettings {
+    /// Networks from 1000 to 7000 px, spread by spread.
+    pub spreads: usize,
+    /// Spreads from 100 px on.
+    pub wide_spreads: usize,
+    /// Views that the networks' errors are taken over, at most.
+    pub views: usize,
+}
+
+impl Default for ExperimentSettings {
+    fn default() -> Self {
+        Self {
+            spreads: 700,
+            wide_spreads: 60,
+            views: 4,
+        }
+    }
+}
 
 /// Errors at one spread, all views together, mm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

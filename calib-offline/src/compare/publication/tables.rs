@@ -5,7 +5,8 @@ use super::known::{Bin, KnownExperiment};
 use super::spread::SpreadExperiment;
 use super::stage::StageExperiment;
 use super::target::TargetExperiment;
-use std::fmt::Write as _;
+use crate::present::numbers::or_empty;
+use crate::present::table::Table;
 
 /// Name and content of a table per figure that there is.
 pub fn tables(evaluation: &Evaluation) -> Vec<(&'static str, String)> {
@@ -26,81 +27,86 @@ pub fn tables(evaluation: &Evaluation) -> Vec<(&'static str, String)> {
     tables
 }
 
-// Writing to a String cannot fail: the results of writeln are of no interest below.
-
 fn spread_table(spread: &SpreadExperiment) -> String {
-    let mut text = String::from("range,spread_px,training_rms_mm,left_out_rms_mm,marker_rms_mm\n");
+    let header = "range,spread_px,training_rms_mm,left_out_rms_mm,marker_rms_mm";
+    let mut table = Table::new(header.split(','));
     for (range, points) in [("published", &spread.published), ("wide", &spread.wide)] {
         for point in points {
-            let marker = point
-                .marker_rms_mm
-                .map_or_else(String::new, |v| v.to_string());
-            let _ = writeln!(
-                text,
-                "{range},{},{},{},{marker}",
-                point.spread_px, point.training_rms_mm, point.left_out_rms_mm
-            );
+            table.row(&[
+                &range,
+                &point.spread_px,
+                &point.training_rms_mm,
+                &point.left_out_rms_mm,
+                &or_empty(point.marker_rms_mm),
+            ]);
         }
     }
-    text
+    table.csv()
 }
 
 fn stage_table(stage: &StageExperiment) -> String {
-    let mut text = String::from("method,placement,pose,dial_deg,error_deg\n");
+    let mut table = Table::new("method,placement,pose,dial_deg,error_deg".split(','));
     for method in &stage.methods {
         for angle in &method.angles {
-            let _ = writeln!(
-                text,
-                "{},{},{},{},{}",
-                method.method, angle.placement, angle.pose, angle.dial_deg, angle.error_deg
-            );
+            table.row(&[
+                &method.method,
+                &angle.placement,
+                &angle.pose,
+                &angle.dial_deg,
+                &angle.error_deg,
+            ]);
         }
     }
-    text
+    table.csv()
 }
 
 fn cloud_table(target: &TargetExperiment) -> String {
-    let mut text = String::from("pose,row,col,x,y,z,x_nominal,y_nominal,z_nominal\n");
+    let header = "pose,row,col,x,y,z,x_nominal,y_nominal,z_nominal";
+    let mut table = Table::new(header.split(','));
     for point in &target.cloud {
         let (m, n) = (point.measured_mm, point.nominal_mm);
-        let _ = writeln!(
-            text,
-            "{},{},{},{},{},{},{},{},{}",
-            point.pose, point.row, point.col, m.x, m.y, m.z, n.x, n.y, n.z
-        );
+        table.row(&[
+            &point.pose,
+            &point.row,
+            &point.col,
+            &m.x,
+            &m.y,
+            &m.z,
+            &n.x,
+            &n.y,
+            &n.z,
+        ]);
     }
-    text
+    table.csv()
 }
 
 fn distance_table(target: Option<&TargetExperiment>, known: Option<&KnownExperiment>) -> String {
-    let mut text = String::from(
-        "kind,method,pose,distance_mm,points,rms_mm,mean_mm,deviation_mm,neighbor_rms_mm,true_rms_mm\n",
-    );
+    let header = "kind,method,pose,distance_mm,points,rms_mm,mean_mm,deviation_mm,\
+                  neighbor_rms_mm,true_rms_mm";
+    let mut table = Table::new(header.split(','));
     for method in target.iter().flat_map(|t| &t.methods) {
         for pose in &method.poses {
             let errors = &pose.errors;
-            let [neighbor, truth] = [pose.neighbor_rms_mm, pose.true_rms_mm]
-                .map(|rms_mm| rms_mm.map_or_else(String::new, |v| v.to_string()));
-            let _ = writeln!(
-                text,
-                "target,{},{},{},{},{},{},{},{neighbor},{truth}",
-                method.method,
-                pose.pose,
-                pose.distance_mm,
-                errors.count,
-                errors.rms_mm,
-                errors.mean_mm,
-                errors.deviation_mm
-            );
+            table.row(&[
+                &"target",
+                &method.method,
+                &pose.pose,
+                &pose.distance_mm,
+                &errors.count,
+                &errors.rms_mm,
+                &errors.mean_mm,
+                &errors.deviation_mm,
+                &or_empty(pose.neighbor_rms_mm),
+                &or_empty(pose.true_rms_mm),
+            ]);
         }
     }
     let mut known_rows = |name: &str, bins: &[Bin]| {
         for bin in bins {
-            let _ = writeln!(
-                text,
-                "known,{name},,{},{},,,,{}",
-                bin.distance_mm, bin.points, bin.placed_rms_mm
-            );
+            let (distance, points, error) = (bin.distance_mm, bin.points, bin.placed_rms_mm);
+            table.row(&[
+                &"known", &name, &"", &distance, &points, &"", &"", &"", &"", &error,
+            ]);
         }
     };
     if let Some(known) = known {
@@ -109,5 +115,5 @@ fn distance_table(target: Option<&TargetExperiment>, known: Option<&KnownExperim
         }
         known_rows("oracle", &known.oracle);
     }
-    text
+    table.csv()
 }

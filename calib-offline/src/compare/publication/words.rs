@@ -4,9 +4,12 @@ use super::Evaluation;
 use super::known::KnownExperiment;
 use super::spread::SpreadExperiment;
 use super::stage::StageExperiment;
+use super::statistics::ErrorStatistics;
 use super::target::{TargetExperiment, TargetMethod};
+use crate::evaluate::known_points::TruthErrors;
 use crate::methods::METHODS;
-use crate::report::text::short;
+use crate::present::numbers::{or_dash, short};
+use crate::present::table::Table;
 use std::fmt::Write as _;
 
 /// The publication's mean error of its method, mm.
@@ -120,118 +123,127 @@ fn spread_words(spread: &SpreadExperiment) -> String {
 }
 
 fn stage_words(stage: &StageExperiment) -> String {
-    let mut text = String::from(
-        "Angles about the stage's axis against the dial (Fig. 8):\n\n\
-         | method | RMS, degrees | worst, degrees | not about the axis, RMS, degrees |\n\
-         | --- | --- | --- | --- |\n",
-    );
+    let mut table = Table::new([
+        "method",
+        "RMS, degrees",
+        "worst, degrees",
+        "not about the axis, RMS, degrees",
+    ]);
     for method in &stage.methods {
         let worst = method.angles.iter().map(|a| a.error_deg.abs());
         let wobbles: Vec<String> = method.wobble_rms_deg.iter().map(|w| short(*w)).collect();
-        let _ = writeln!(
-            text,
-            "| {} | {} | {} | {} |",
-            method.method,
-            short(method.rms_deg),
-            short(worst.fold(0.0, f64::max)),
-            wobbles.join(", ")
-        );
+        table.row(&[
+            &method.method,
+            &short(method.rms_deg),
+            &short(worst.fold(0.0, f64::max)),
+            &wobbles.join(", "),
+        ]);
     }
-    text + "\n"
+    format!(
+        "Angles about the stage's axis against the dial (Fig. 8):\n\n{}\n",
+        table.left_aligned().markdown()
+    )
 }
 
 fn target_words(target: &TargetExperiment) -> String {
-    let mut text = format!(
-        "Measurement target (Fig. 10, 11): {} of {} markers were measured by every method. Distances \
-         of markers from the best-placed nominal target:\n\n\
-         | method | mean, mm | standard deviation, mm | RMS, mm | worst, mm | neighbors' distance, RMS, mm | true places *, RMS, mm | no point |\n\
-         | --- | --- | --- | --- | --- | --- | --- | --- |\n",
-        target.common, target.markers
-    );
+    let mut table = Table::new([
+        "method",
+        "mean, mm",
+        "standard deviation, mm",
+        "RMS, mm",
+        "worst, mm",
+        "neighbors' distance, RMS, mm",
+        "true places *, RMS, mm",
+        "no point",
+    ]);
     for method in &target.methods {
-        let number = |of: fn(&super::statistics::ErrorStatistics) -> f64| {
-            method
-                .errors
-                .as_ref()
-                .map_or("-".to_owned(), |e| short(of(e)))
-        };
-        let _ = writeln!(
-            text,
-            "| {} | {} | {} | {} | {} | {} | {} | {} |",
-            method.method,
-            number(|e| e.mean_mm),
-            number(|e| e.deviation_mm),
-            number(|e| e.rms_mm),
-            number(|e| e.worst_mm),
-            method.neighbor_rms_mm.map_or("-".to_owned(), short),
-            method.true_rms_mm.map_or("-".to_owned(), short),
-            method.without_point
-        );
+        let errors = method.errors.as_ref();
+        let number = |of: fn(&ErrorStatistics) -> f64| or_dash(errors.map(|e| short(of(e))));
+        table.row(&[
+            &method.method,
+            &number(|e| e.mean_mm),
+            &number(|e| e.deviation_mm),
+            &number(|e| e.rms_mm),
+            &number(|e| e.worst_mm),
+            &or_dash(method.neighbor_rms_mm.map(short)),
+            &or_dash(method.true_rms_mm.map(short)),
+            &method.without_point,
+        ]);
     }
-    text + "\n\\* where the truth is known, after one rigid placement of all poses together\n\n"
+    format!(
+        "Measurement target (Fig. 10, 11): {} of {} markers were measured by every method. Distances \
+         of markers from the best-placed nominal target:\n\n{}\n\
+         \\* where the truth is known, after one rigid placement of all poses together\n\n",
+        target.common,
+        target.markers,
+        table.left_aligned().markdown()
+    )
 }
 
 fn known_words(known: &KnownExperiment) -> String {
-    let mut text = format!(
+    let mut table = Table::new([
+        "method",
+        "as measured, mm",
+        "frame placed, mm",
+        "ratio",
+        "no point",
+    ]);
+    for method in &known.methods {
+        let errors = method.errors.as_ref();
+        let number = |of: fn(&TruthErrors) -> f64| or_dash(errors.map(|e| short(of(e))));
+        let direct = if known.frame_is_true {
+            number(|e| e.direct_rms_mm)
+        } else {
+            "-".to_owned()
+        };
+        table.row(&[
+            &method.method,
+            &direct,
+            &number(|e| e.placed_rms_mm),
+            &number(|e| e.placed_ratio),
+            &method.without_point,
+        ]);
+    }
+    format!(
         "Points with known truth: {} of {} were measured by every method. RMS errors; the ratio is to \
-         the true rays of the same noisy pixels{}:\n\n\
-         | method | as measured, mm | frame placed, mm | ratio | no point |\n\
-         | --- | --- | --- | --- | --- |\n",
+         the true rays of the same noisy pixels{}:\n\n{}\n",
         known.common,
         known.matches,
         if known.frame_is_true {
             ""
         } else {
             " (the frame is not that of the truth: only placed errors count)"
-        }
-    );
-    for method in &known.methods {
-        let errors = method.errors.as_ref();
-        let number = |of: fn(&crate::evaluate::known_points::TruthErrors) -> f64| {
-            errors.map_or("-".to_owned(), |e| short(of(e)))
-        };
-        let _ = writeln!(
-            text,
-            "| {} | {} | {} | {} | {} |",
-            method.method,
-            if known.frame_is_true {
-                number(|e| e.direct_rms_mm)
-            } else {
-                "-".to_owned()
-            },
-            number(|e| e.placed_rms_mm),
-            number(|e| e.placed_ratio),
-            method.without_point
-        );
-    }
-    text + "\n"
+        },
+        table.left_aligned().markdown()
+    )
 }
 
 fn published_table(evaluations: &[Evaluation]) -> String {
-    let mut text = String::from(
-        "| | method | mean error of markers, mm | largest standard deviation of a pose, mm |\n\
-         | --- | --- | --- | --- |\n",
-    );
-    let _ = writeln!(
-        text,
-        "| publication | its own (alternating) | {PUBLISHED_MEAN_MM} | {PUBLISHED_DEVIATION_MM} |"
-    );
+    let mut table = Table::new([
+        "",
+        "method",
+        "mean error of markers, mm",
+        "largest standard deviation of a pose, mm",
+    ]);
+    table.row(&[
+        &"publication",
+        &"its own (alternating)",
+        &PUBLISHED_MEAN_MM,
+        &PUBLISHED_DEVIATION_MM,
+    ]);
     for evaluation in evaluations {
         for method in METHODS {
             let measured = evaluation.target.as_ref();
             let found = measured.and_then(|t| t.methods.iter().find(|m| m.method == method.name()));
-            let number = |of: fn(&TargetMethod) -> Option<f64>| {
-                found.and_then(of).map_or("-".to_owned(), short)
-            };
-            let _ = writeln!(
-                text,
-                "| {} | {} | {} | {} |",
-                evaluation.name,
-                method.name(),
-                number(|m| m.errors.as_ref().map(|e| e.mean_mm)),
-                number(|m| m.largest_pose_deviation_mm)
-            );
+            let number =
+                |of: fn(&TargetMethod) -> Option<f64>| or_dash(found.and_then(of).map(short));
+            table.row(&[
+                &evaluation.name,
+                &method.name(),
+                &number(|m| m.errors.as_ref().map(|e| e.mean_mm)),
+                &number(|m| m.largest_pose_deviation_mm),
+            ]);
         }
     }
-    text
+    table.left_aligned().markdown()
 }

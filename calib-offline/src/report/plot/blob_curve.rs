@@ -1,10 +1,10 @@
 //! Bytes of a blob's tables against the error of its rays.
 
-use super::axes::{Axes, Tick, decades};
-use super::svg::Svg;
 use super::{Figure, WIDTH};
+use crate::present::axes::{Axes, Tick, decades};
+use crate::present::numbers::short;
+use crate::present::svg::Svg;
 use crate::report::BlobFacts;
-use crate::report::text::short;
 
 /// One drawing, both axes logarithmic; the bound asked for is a line across.
 pub fn draw(blob: &BlobFacts) -> Option<Figure> {

@@ -1,10 +1,10 @@
 //! The cost after each accepted step of the estimate.
 
-use super::axes::{Axes, decades, round_up, ticks};
-use super::svg::Svg;
 use super::{Figure, WIDTH};
+use crate::present::axes::{Axes, decades, round_up, ticks};
+use crate::present::numbers::short;
+use crate::present::svg::Svg;
 use crate::report::Calibration;
-use crate::report::text::short;
 
 /// One drawing; the cost on a logarithmic scale where it falls far.
 pub fn draw(calibration: &Calibration) -> Option<Figure> {

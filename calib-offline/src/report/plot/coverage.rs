@@ -1,7 +1,7 @@
 //! Where on the sensor corners were seen, and which part is calibrated because of them.
 
-use super::svg::{Svg, point};
 use super::{Figure, WIDTH};
+use crate::present::svg::{Svg, point};
 use crate::report::Calibration;
 use calib_rays::field::CalibratedCamera;
 use calib_rays::geometry::{PixelPoint, SensorSize};

@@ -1,8 +1,9 @@
 //! How the residuals are distributed, beside the Gaussian of the noise that was estimated.
 
-use super::axes::{Axes, round_up, ticks};
-use super::svg::Svg;
 use super::{Figure, WIDTH};
+use crate::present::axes::{Axes, round_up, ticks};
+use crate::present::numbers::short;
+use crate::present::svg::Svg;
 use crate::report::Calibration;
 
 /// Shown on either side of zero, in standard deviations.
@@ -70,7 +71,7 @@ pub fn draw(calibration: &Calibration) -> Option<Figure> {
         caption: format!(
             "Percent of {} components per bin of a quarter standard deviation; the line is a Gaussian of {} px. {beyond} components lie beyond 5 standard deviations, {} corners were rejected.",
             components.len(),
-            crate::report::text::short(sigma_px),
+            short(sigma_px),
             calibration.estimate.corners_rejected
         ),
     })

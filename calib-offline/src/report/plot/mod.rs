@@ -3,16 +3,13 @@
 //! Colors are classes of the page's style sheet, so that a drawing is readable on light and on
 //! dark ground. All drawings are [`WIDTH`] units wide, about what a phone shows at full size.
 
-pub mod axes;
 pub mod blob_curve;
-pub mod chart;
 pub mod cost;
 pub mod coverage;
 pub mod histogram;
 pub mod pose_rms;
 pub mod residual_vectors;
 pub mod scene;
-pub mod svg;
 pub mod uncertainty_map;
 
 /// Width of every drawing, units.

@@ -1,8 +1,8 @@
 //! RMS of the residual vectors per pose and camera, worst first.
 
-use super::axes::{Axes, round_up};
-use super::svg::{Anchor, Svg};
 use super::{Figure, WIDTH};
+use crate::present::axes::{Axes, round_up};
+use crate::present::svg::{Anchor, Svg};
 use crate::report::Calibration;
 use crate::report::record::PoseRecord;
 

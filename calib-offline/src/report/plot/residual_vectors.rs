@@ -2,8 +2,8 @@
 //! color by direction. Random colors are noise; an area of one color is a pattern.
 
 use super::coverage::SensorView;
-use super::svg::{Anchor, Svg, point};
 use super::{Figure, WIDTH};
+use crate::present::svg::{Anchor, Svg, point};
 use crate::report::Calibration;
 use crate::report::record::CornerRecord;
 use calib_rays::field::CalibratedCamera;

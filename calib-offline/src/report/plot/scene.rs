@@ -1,9 +1,9 @@
 //! Cameras and boards in space, seen aslant and from above.
 
-use super::svg::{Anchor, Svg};
 use super::{Figure, WIDTH};
+use crate::present::numbers::short;
+use crate::present::svg::{Anchor, Svg};
 use crate::report::Calibration;
-use crate::report::text::short;
 use calib_rays::geometry::{PixelPoint, RigidTransform};
 use nalgebra::{Matrix2x3, Vector2, Vector3};
 

@@ -2,11 +2,11 @@
 //! what the calibration leaves open, and that with the noise of one pair of pixels.
 
 use super::coverage::SensorView;
-use super::svg::{Anchor, Svg, point};
 use super::{Figure, WIDTH};
+use crate::present::numbers::short;
+use crate::present::svg::{Anchor, Svg, point};
 use crate::report::Calibration;
 use crate::report::facts::Facts;
-use crate::report::text::short;
 use calib_rays::field::{CalibratedCamera, PairUncertainty, PointCovariance};
 use calib_rays::geometry::PixelPoint;
 use nalgebra::Matrix3;

@@ -1,0 +1,10 @@
+//! What a command tells the shell.
+
+/// How a command that ran to its end came out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// Done: exit code 0.
+    Done,
+    /// Done, but the verdict is "fail": exit code 1.
+    VerdictFail,
+}

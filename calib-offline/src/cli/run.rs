@@ -1,0 +1,51 @@
+//! From the arguments of the process to its exit code: each verb's work is in its own file.
+
+use super::args::{Cli, Verb};
+use super::error::Error;
+use super::outcome::Outcome;
+use super::output::Console;
+use super::settings::Settings;
+use super::{
+    calibrate, compare, demo, device, evaluate, export, failure, flash, inspect, measure, methods,
+    pack, recording,
+};
+use clap::Parser;
+use std::process::ExitCode;
+
+/// Runs the command that the process was started with.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return failure::of_arguments(&error, std::env::args_os()),
+    };
+    let console = Console::new(Settings::resolve(&cli.common));
+    if let Some(threads) = cli.common.threads {
+        // Fails only if the pool exists already; then it has the threads it has.
+        let _ = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads.get())
+            .build_global();
+    }
+    match run(&cli.verb, &console) {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::VerdictFail) => ExitCode::from(1),
+        Err(error) => failure::of_command(&error, &console),
+    }
+}
+
+fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
+    match verb {
+        Verb::Calibrate(args) => calibrate::run(args, console, &crate::pipeline::calibrate),
+        Verb::Compare(args) => compare::run(args),
+        Verb::Demo(args) => demo::run(args, console),
+        Verb::Detect(args) => recording::detect(args, console),
+        Verb::Device(args) => device::run(args, console),
+        Verb::Evaluate(args) => evaluate::run(args, console),
+        Verb::Export(args) => export::run(args, console),
+        Verb::Flash(args) => flash::run(args, console),
+        Verb::Inspect(args) => inspect::run(args, console),
+        Verb::Measure(args) => measure::run(args, console),
+        Verb::Methods(args) => methods::run(args, console),
+        Verb::Pack(args) => pack::run(args, console),
+        Verb::Simulate(args) => recording::simulate(args, console),
+    }
+}
