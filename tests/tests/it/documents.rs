@@ -82,6 +82,41 @@ fn source_files_named_in_docs_exist() {
 }
 
 #[test]
+fn the_walks_lead_to_what_they_name() {
+    let root = root();
+    let text = read(&root.join("CONTRIBUTING.md"));
+    let (_, walks) = text
+        .split_once("## Where to change what")
+        .expect("the walks");
+    let walks = walks.split("\n## ").next().unwrap_or_default();
+    let (mut paths, mut names, mut wrong) = (0, 0, Vec::new());
+    for walk in walks.split("\n\n") {
+        let spans: Vec<&str> = walk.split('`').skip(1).step_by(2).collect();
+        let (places, words): (Vec<&str>, Vec<&str>) =
+            spans.into_iter().partition(|span| span.contains('/'));
+        let mut contents = String::new();
+        for place in places {
+            paths += 1;
+            let path = root.join(place);
+            if path.is_file() {
+                contents += &read(&path);
+            } else if !path.is_dir() {
+                wrong.push(format!("no {place}"));
+            }
+        }
+        for word in words {
+            names += 1;
+            let is_part = |c: char| c.is_alphanumeric() || c == '_';
+            if !contents.split(|c| !is_part(c)).any(|part| part == word) {
+                wrong.push(format!("no `{word}` in the files of its walk"));
+            }
+        }
+    }
+    assert!(paths >= 15 && names >= 8, "{paths} paths, {names} names");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
 fn citations_are_read_in_all_their_forms() {
     let cited = |text: &str| {
         citations(text)
