@@ -2,12 +2,12 @@
 
 mod cost;
 
+use std::error::Error;
 use std::io::Write;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::Context;
 use clap::{Parser, Subcommand};
 use cost::InQemu;
 use firmware_sim::simulated::flash_file::{self, FlashFile};
@@ -78,19 +78,19 @@ struct DeviceArguments {
 }
 
 impl DeviceArguments {
-    fn rig(&self) -> anyhow::Result<Option<Rig>> {
+    fn rig(&self) -> Result<Option<Rig>, Failure> {
         if self.cameras.is_empty() {
             return Ok(None);
         }
         let Ok(cameras) = heapless::Vec::from_slice(&self.cameras) else {
-            anyhow::bail!("a device has {MAX_CAMERAS_LISTED} cameras at most");
+            return Err(format!("a device has {MAX_CAMERAS_LISTED} cameras at most").into());
         };
         let serial = name(self.serial.as_deref().unwrap_or_default());
         Ok(Some(Rig { serial, cameras }))
     }
 
     /// The flash that the device starts with, and the file that it is kept in.
-    fn flash(&self) -> anyhow::Result<FlashFile> {
+    fn flash(&self) -> Result<FlashFile, Failure> {
         let rig = self.rig()?;
         let Some(path) = &self.flash_file else {
             return Ok(FlashFile::in_memory(flash_file::blank(rig.as_ref())?));
@@ -133,17 +133,31 @@ fn listen_address(text: &str) -> Result<SocketAddr, String> {
         .map_err(|_| "give ADDRESS:PORT, such as 127.0.0.1:7777, or a port alone".to_owned())
 }
 
+/// What went wrong, with its causes.
+type Failure = Box<dyn Error>;
+
+/// An error and its causes in one line.
+fn chain(error: &dyn Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        text = format!("{text}: {error}");
+        cause = error.source();
+    }
+    text
+}
+
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("firmware-sim: {error:#}");
+            eprintln!("firmware-sim: {}", chain(error.as_ref()));
             ExitCode::from(2)
         }
     }
 }
 
-fn run(arguments: &Arguments) -> anyhow::Result<()> {
+fn run(arguments: &Arguments) -> Result<(), Failure> {
     match &arguments.command {
         Command::Host(device) => run_on_host(device),
         Command::Qemu { device, image } => run_in_qemu(device, image.as_deref()),
@@ -166,23 +180,23 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
             };
             std::io::stdout()
                 .write_all(text.as_bytes())
-                .context("standard output")
+                .map_err(no_output)
         }
     }
 }
 
-fn run_on_host(arguments: &DeviceArguments) -> anyhow::Result<()> {
+fn run_on_host(arguments: &DeviceArguments) -> Result<(), Failure> {
     let FlashFile { flash, kept_in } = arguments.flash()?;
     let trust = arguments.public_key.map_or(Trust::Anybody, Trust::Signed);
     let device = SimulatedDevice::start_trusting(arguments.listen, flash, trust)
-        .with_context(|| format!("the device on {}", arguments.listen))?;
+        .map_err(|error| format!("the device on {}: {error}", arguments.listen))?;
     announce(device.address())?;
     device.serve_forever();
     drop(kept_in);
-    anyhow::bail!("the device stopped")
+    Err("the device stopped".into())
 }
 
-fn run_in_qemu(arguments: &DeviceArguments, image: Option<&Path>) -> anyhow::Result<()> {
+fn run_in_qemu(arguments: &DeviceArguments, image: Option<&Path>) -> Result<(), Failure> {
     // Before the image, whose first build takes a minute.
     qemu::require_qemu()?;
     let flash = arguments.flash()?;
@@ -198,14 +212,18 @@ fn run_in_qemu(arguments: &DeviceArguments, image: Option<&Path>) -> anyhow::Res
     let device = QemuDevice::start_with(arguments.listen, &image, flash)?;
     announce(device.address())?;
     let status = device.wait()?;
-    anyhow::bail!("QEMU stopped ({status})")
+    Err(format!("QEMU stopped ({status})").into())
 }
 
 /// Says where the device can be reached. Whoever started this program may wait for the line, so it
 /// must get out.
-fn announce(address: SocketAddr) -> anyhow::Result<()> {
+fn announce(address: SocketAddr) -> Result<(), Failure> {
     let mut output = std::io::stdout();
     writeln!(output, "listening on {address}")
         .and_then(|()| output.flush())
-        .context("standard output")
+        .map_err(no_output)
+}
+
+fn no_output(error: std::io::Error) -> Failure {
+    format!("standard output: {error}").into()
 }
