@@ -224,6 +224,6 @@ fn announce(address: SocketAddr) -> Result<(), Failure> {
         .map_err(no_output)
 }
 
-fn no_output(error: std::io::Error) -> Failure {
+fn no_output(error: impl Error) -> Failure {
     format!("standard output: {error}").into()
 }
