@@ -192,10 +192,10 @@ mod tests {
         accepts_equal: false,
     };
 
-    /// Rosenbrock's valley: residuals `10 (y - x^2)` and `1 - x`; undefined left of a wall.
+    /// Rosenbrock's valley: residuals `10 (y - x^2)` and `1 - x`; undefined right of a wall.
     struct Valley {
         wall: f64,
-        /// Shares of the second residual's equations: with 0 only the first counts.
+        /// How much the second residual counts, 1 or 0.
         share: f64,
     }
 
@@ -228,7 +228,7 @@ mod tests {
 
         fn moved(&self, x: &Self::State, step: &Self::Step) -> Option<Self::State> {
             let next = x + step;
-            (next.x > self.wall).then_some(next)
+            (next.x < self.wall).then_some(next)
         }
 
         fn is_settled(&self, tried: &Tried<Self>) -> bool {
@@ -239,7 +239,7 @@ mod tests {
     #[test]
     fn the_bottom_of_a_bent_valley_is_found() {
         let valley = Valley {
-            wall: f64::NEG_INFINITY,
+            wall: f64::INFINITY,
             share: 1.0,
         };
         let outcome = minimize(&valley, Vector2::new(-1.2, 1.0), &SETTINGS);
@@ -252,7 +252,7 @@ mod tests {
     #[test]
     fn limits_count_linearizations_and_steps() {
         let valley = Valley {
-            wall: f64::NEG_INFINITY,
+            wall: f64::INFINITY,
             share: 1.0,
         };
         let start = Vector2::new(-1.2, 1.0);
@@ -284,10 +284,10 @@ mod tests {
     #[test]
     fn a_step_beyond_what_is_defined_ends_the_search_where_it_was() {
         let valley = Valley {
-            wall: -1.3,
+            wall: 0.0,
             share: 1.0,
         };
-        let start = Vector2::new(-1.2, -30.0);
+        let start = Vector2::new(-1.2, 1.0);
         let outcome = minimize(&valley, start, &SETTINGS);
         assert_eq!(
             (outcome.stop, outcome.state),
@@ -299,7 +299,7 @@ mod tests {
     fn equations_that_damping_does_not_mend_are_singular() {
         // Nothing depends on x at x = 0.
         let valley = Valley {
-            wall: f64::NEG_INFINITY,
+            wall: f64::INFINITY,
             share: 0.0,
         };
         let outcome = minimize(&valley, Vector2::new(0.0, 1.0), &SETTINGS);

@@ -18,6 +18,7 @@ mod edge_fit;
 pub mod epipolar;
 mod error;
 pub mod grid;
+pub mod illegible;
 mod job;
 pub mod labelling;
 pub mod overlay;
@@ -42,6 +43,7 @@ use chessboard::{ChessTopologicalDetector, ChessboardDetector};
 use consistency::UnsettledView;
 use detection::turned_images;
 use grid::FittedGrid;
+use illegible::{Illegible, Shown};
 use job::{Job, all_loaded};
 use labelling::{Placement, placements};
 use pair_check::pair_checks;
@@ -185,7 +187,7 @@ fn inspect(
     if let (Some(typical), Some(square_px)) = (grid.typical(), grid.square_px())
         && typical.blur_px > verdict::MAX_BLUR_SQUARES * square_px
     {
-        return Err(Refusal::too_blurred(typical.blur_px));
+        return Err(Illegible::blurred(typical.blur_px, Shown::Board).into());
     }
     let borders = if grid.is_whole(board) {
         Borders::UNKNOWN

@@ -1,6 +1,7 @@
 //! What became of each image: used, or refused and why.
 
 use super::grid::{FittedGrid, Typical};
+use super::illegible::{EDGE_WIDTH_OF_BLUR, Illegible, Shown};
 use crate::dataset::image::GrayImage;
 use calib_rays::board::BoardSpec;
 use std::path::PathBuf;
@@ -41,24 +42,9 @@ pub enum Outcome {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// Bright and dark differ by too little.
-    #[error(
-        "too little contrast: bright and dark differ by {contrast_percent:.1} % of the range; \
-         expose longer or light the board better"
-    )]
-    LowContrast {
-        /// Difference of the 99.5 % and the 0.5 % quantile, percent of the white level.
-        contrast_percent: f64,
-    },
-    /// The board's edges, or the steepest of the image if there is no board, are too wide.
-    #[error(
-        "blurred: the edges are about {edge_px:.0} px wide; focus the lens, and let the board stand \
-         still"
-    )]
-    Blurred {
-        /// Width of the edges from 10 % to 90 %, px.
-        edge_px: f64,
-    },
+    /// The image shows nothing clearly.
+    #[error(transparent)]
+    Illegible(#[from] Illegible),
     /// No grid of corners.
     #[error("no chessboard found: is the whole board in view, and lit evenly?")]
     NoBoard,
@@ -99,15 +85,6 @@ pub enum Refusal {
     WrongColors,
 }
 
-impl Refusal {
-    /// The board is there, but blurred by a standard deviation of so many pixels.
-    pub fn too_blurred(blur_px: f64) -> Self {
-        Self::Blurred {
-            edge_px: EDGE_WIDTH_OF_BLUR * blur_px,
-        }
-    }
-}
-
 /// What to do about a board of another size; sizes are (rows, cols).
 fn wrong_size_hint(found: (usize, usize), stated: (usize, usize)) -> String {
     let sorted = |(a, b): (usize, usize)| (a.min(b), a.max(b));
@@ -146,15 +123,8 @@ pub struct ImageFigures {
     pub sigma_px: f64,
 }
 
-/// An edge blurred by a Gaussian takes this many standard deviations from 10 % to 90 %.
-pub(super) const EDGE_WIDTH_OF_BLUR: f64 = 2.563;
-/// Less contrast than this part of the range is refused: with 8 bits, 10 code values.
-const MIN_CONTRAST_PERCENT: f64 = 4.0;
 /// Squares blurred by more than this part of their side run into each other.
 pub const MAX_BLUR_SQUARES: f64 = 0.25;
-/// Without a board, edges at least this wide are called blurred, px.
-const BLURRED_EDGE_PX: f64 = 8.0;
-
 impl ImageFigures {
     /// The figures of a grid; `None` if it has no corners.
     pub fn of(image: &GrayImage, grid: &FittedGrid) -> Option<Self> {
@@ -177,19 +147,7 @@ impl ImageFigures {
 
 /// Why nothing was found in an image that could be read.
 pub fn why_nothing_found(image: &GrayImage) -> Refusal {
-    let [dark, bright] = image.quantiles([0.005, 0.995]);
-    let contrast = f64::from(bright - dark);
-    let contrast_percent = 100.0 * contrast / f64::from(image.white_level);
-    if contrast_percent < MIN_CONTRAST_PERCENT {
-        return Refusal::LowContrast { contrast_percent };
-    }
-    let steepest = steepest_slope(image);
-    // A step blurred by a Gaussian has the slope contrast / (sigma sqrt(2 pi)).
-    let blur_px = contrast / (steepest * std::f64::consts::TAU.sqrt());
-    if EDGE_WIDTH_OF_BLUR * blur_px > BLURRED_EDGE_PX {
-        return Refusal::too_blurred(blur_px);
-    }
-    Refusal::NoBoard
+    Illegible::of(image, Shown::Board).map_or(Refusal::NoBoard, Refusal::from)
 }
 
 /// The grid, with the borders seen around it, is no part of the board.
@@ -201,27 +159,4 @@ pub fn why_not_placed(grid: &FittedGrid, board: &BoardSpec) -> Refusal {
         rows: board.rows,
         cols: board.cols,
     }
-}
-
-/// The slope that 0.5 % of the pixels exceed, code values per pixel (central differences).
-fn steepest_slope(image: &GrayImage) -> f64 {
-    let (width, height) = (
-        i64::from(image.sensor.width),
-        i64::from(image.sensor.height),
-    );
-    let mut slopes = Vec::new();
-    for v in 1..height - 1 {
-        for u in 1..width - 1 {
-            let at = |u, v| image.at(u, v).map_or(0.0, f64::from);
-            let (du, dv) = (at(u + 1, v) - at(u - 1, v), at(u, v + 1) - at(u, v - 1));
-            slopes.push(du.hypot(dv) / 2.0);
-        }
-    }
-    slopes.sort_unstable_by(f64::total_cmp);
-    let k = (slopes.len() as f64 * 0.995) as usize;
-    slopes
-        .get(k.min(slopes.len().saturating_sub(1)))
-        .copied()
-        .unwrap_or(0.0)
-        .max(f64::MIN_POSITIVE)
 }

@@ -5,6 +5,7 @@ use crate::ring_shots::{Errors, Shot, located, target};
 use calib_rays::geometry::{PixelPoint, SensorSize};
 use calib_recording::dataset::TargetSpec;
 use calib_recording::dataset::image::GrayImage;
+use calib_recording::detect::illegible::Illegible;
 use calib_recording::detect::ring_target::{Located, TargetRefusal, TargetSettings, locate};
 use calib_simulate::{OpticsKind, RenderSettings, Scene, SceneSettings};
 use std::collections::BTreeMap;
@@ -288,7 +289,7 @@ fn images_without_the_target_say_why() {
     let flat = GrayImage::from_values(sensor, vec![80.0; 640 * 480], 255.0).unwrap();
     assert!(matches!(
         located(&flat),
-        Err(TargetRefusal::LowContrast { .. })
+        Err(TargetRefusal::Illegible(Illegible::LowContrast { .. }))
     ));
     // Noise alone, from a generator that anybody can write down.
     let mut state = 1_u32;
@@ -315,7 +316,7 @@ fn images_without_the_target_say_why() {
     let blurred = upright().with(|render| render.blur_px = 9.0);
     let refusal = located(&blurred.image()).unwrap_err();
     assert!(
-        matches!(refusal, TargetRefusal::Blurred { .. }),
+        matches!(refusal, TargetRefusal::Illegible(Illegible::Blurred { .. })),
         "{refusal}"
     );
 }

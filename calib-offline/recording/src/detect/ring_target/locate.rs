@@ -13,6 +13,7 @@ use super::settings::TargetSettings;
 use super::verdict::TargetRefusal;
 use crate::dataset::TargetSpec;
 use crate::dataset::image::GrayImage;
+use crate::detect::illegible::{Illegible, Shown};
 use calib_rays::numerics::median;
 use nalgebra::Vector2;
 use std::collections::BTreeMap;
@@ -175,7 +176,7 @@ fn check_blur<'a>(
     let width = median(rings.map(|ring| ring.mean_radius_px() * (1.0 - ring.ratio)));
     match (blur, width) {
         (Some(blur), Some(width)) if blur > MAX_BLUR * width => {
-            Err(TargetRefusal::too_blurred(blur))
+            Err(Illegible::blurred(blur, Shown::Target).into())
         }
         _ => Ok(()),
     }

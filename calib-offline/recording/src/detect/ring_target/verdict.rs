@@ -4,7 +4,7 @@ use super::located::Located;
 use super::ring_fit::FittedRing;
 use crate::dataset::TargetSpec;
 use crate::dataset::image::GrayImage;
-use crate::detect::verdict::{EDGE_WIDTH_OF_BLUR, Refusal, why_nothing_found};
+use crate::detect::illegible::{EDGE_WIDTH_OF_BLUR, Illegible, Shown};
 use calib_rays::numerics::median;
 use std::path::PathBuf;
 
@@ -27,24 +27,9 @@ pub struct TargetImage {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TargetRefusal {
-    /// Bright and dark differ by too little.
-    #[error(
-        "too little contrast: bright and dark differ by {contrast_percent:.1} % of the range; \
-         expose longer or light the target better"
-    )]
-    LowContrast {
-        /// Difference of the 99.5 % and the 0.5 % quantile, percent of the white level.
-        contrast_percent: f64,
-    },
-    /// The markers' edges, or the steepest of the image if there are no markers, are too wide.
-    #[error(
-        "blurred: the edges are about {edge_px:.0} px wide; focus the lens, and let the target stand \
-         still"
-    )]
-    Blurred {
-        /// Width of the edges from 10 % to 90 %, px.
-        edge_px: f64,
-    },
+    /// The image shows nothing clearly.
+    #[error(transparent)]
+    Illegible(#[from] Illegible),
     /// Nothing that looks like a ring.
     #[error("no ring markers found: is the target in view, and lit evenly?")]
     NoMarkers,
@@ -108,21 +93,13 @@ pub enum TargetRefusal {
 }
 
 impl TargetRefusal {
-    /// The markers are there, but blurred by a standard deviation of so many pixels.
-    pub fn too_blurred(blur_px: f64) -> Self {
-        Self::Blurred {
-            edge_px: EDGE_WIDTH_OF_BLUR * blur_px,
-        }
-    }
-
     /// The image has `have` markers in rows and columns (of `rings` that look like some), which is
     /// too few.
     pub fn too_few(image: &GrayImage, rings: usize, have: usize, need: usize) -> Self {
-        match why_nothing_found(image) {
-            Refusal::LowContrast { contrast_percent } => Self::LowContrast { contrast_percent },
-            Refusal::Blurred { edge_px } => Self::Blurred { edge_px },
-            _ if rings == 0 => Self::NoMarkers,
-            _ => Self::TooFewMarkers { have, need },
+        match Illegible::of(image, Shown::Target) {
+            Some(illegible) => illegible.into(),
+            None if rings == 0 => Self::NoMarkers,
+            None => Self::TooFewMarkers { have, need },
         }
     }
 }

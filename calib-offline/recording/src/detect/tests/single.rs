@@ -146,7 +146,7 @@ fn images_without_a_board_say_why() {
     photo.levels = [30.0, 33.0, 32.0];
     assert!(matches!(
         refusal(photo.board, photo.clone()),
-        Refusal::LowContrast { .. }
+        Refusal::Illegible(Illegible::LowContrast { .. })
     ));
     photo.levels = [100.0, 100.0, 100.0];
     photo.noise = 25.0;
@@ -157,7 +157,10 @@ fn images_without_a_board_say_why() {
     photo = tilted(board(6, 9), 0.0, [10.0, -20.0], 0.0, 0.0);
     photo.blur_px = 14.0;
     let refused = refusal(photo.board, photo);
-    assert!(matches!(refused, Refusal::Blurred { .. }), "{refused:?}");
+    assert!(
+        matches!(refused, Refusal::Illegible(Illegible::Blurred { .. })),
+        "{refused:?}"
+    );
 }
 
 #[test]
