@@ -325,7 +325,7 @@ fn the_blocked_equations_are_the_dense_ones() {
         let ln_determinant: f64 = 2.0 * cholesky.l().diagonal().map(f64::ln).sum();
         assert!((reduced.ln_determinant() - ln_determinant).abs() < 1e-3);
         let covariance = cholesky.inverse();
-        for (k, variance) in reduced.global_variances().iter().enumerate() {
+        for (k, variance) in reduced.marginal_variances().iter().enumerate() {
             assert!((variance / covariance[(k, k)] - 1.0).abs() < 1e-3, "{k}");
         }
         // With the unit vectors for probes, the estimate of the trace is the trace by their number.

@@ -2,7 +2,7 @@
 //! the marginal likelihood of the data (METHOD 2.4, 9A).
 
 use crate::adjust::equations::knots::{thin_plate, thin_plate_ln_determinant};
-use crate::adjust::equations::reduced::Reduced;
+use crate::adjust::equations::schur_complement::SchurComplement;
 use crate::adjust::model::Layout;
 use crate::adjust::priors::{CameraPriors, Priors};
 use crate::adjust::{CameraModel, Model};
@@ -212,8 +212,8 @@ impl Smoothness {
     /// One fixed-point step of every weight (MacKay): `lambda <- gamma / energy` with
     /// `gamma = dim - lambda tr(S covariance)`, the number of parameters that the data determine,
     /// and `energy = a^T S a`.
-    pub fn update(&mut self, model: &Model, layout: &Layout, reduced: &Reduced) {
-        let variances = reduced.global_variances();
+    pub fn update(&mut self, model: &Model, layout: &Layout, reduced: &SchurComplement) {
+        let variances = reduced.marginal_variances();
         for group in &mut self.groups {
             let camera = &model.cameras[group.camera_idx];
             let (dimension, trace, energy) = match group.family {

@@ -4,7 +4,7 @@ use super::correlation::{effective_share, neighbor_correlation};
 use super::error::EstimateError;
 use super::evidence::Smoothness;
 use crate::adjust::equations::normal_equations::NormalEquations;
-use crate::adjust::equations::reduced::Reduced;
+use crate::adjust::equations::schur_complement::SchurComplement;
 use crate::adjust::levenberg::{self, Settings};
 use crate::adjust::model::Layout;
 use crate::adjust::objective::{self, Weights};
@@ -159,7 +159,7 @@ impl Fit {
         let weights = self.reweight(observations);
         let priors = self.priors();
         let (layout, equations, reduced) = self.linearized(observations, &weights, &priors)?;
-        let evidence = self.ln_evidence_twice(&reduced, &priors);
+        let evidence = self.ln_marginal_likelihood_twice(&reduced, &priors);
         let stepped = self.model.stepped(&layout, &equations.step(&reduced));
         let cost = |model: &Model, residuals: &[Vec<Option<Vector2<f64>>>]| {
             objective::cost_of_residuals(residuals, model, observations, &weights, &priors)
@@ -182,7 +182,7 @@ impl Fit {
     pub fn equations(
         &mut self,
         observations: &Observations,
-    ) -> Result<(Layout, NormalEquations, Reduced), EstimateError> {
+    ) -> Result<(Layout, NormalEquations, SchurComplement), EstimateError> {
         let weights = self.reweight(observations);
         self.linearized(observations, &weights, &self.priors())
     }
@@ -192,7 +192,7 @@ impl Fit {
         observations: &Observations,
         weights: &Weights,
         priors: &Priors,
-    ) -> Result<(Layout, NormalEquations, Reduced), EstimateError> {
+    ) -> Result<(Layout, NormalEquations, SchurComplement), EstimateError> {
         let layout = self.model.layout();
         let equations = NormalEquations::assemble(
             &self.model,
@@ -212,7 +212,7 @@ impl Fit {
     fn update_smoothness(
         &mut self,
         layout: &Layout,
-        reduced: &Reduced,
+        reduced: &SchurComplement,
         observations: &Observations,
     ) {
         self.smoothness.update(&self.model, layout, reduced);
@@ -248,7 +248,7 @@ impl Fit {
     /// Twice the logarithm of the evidence, up to a constant that all models of the same data
     /// share (METHOD 2.4): likelihood of the residuals under their own distribution, with the
     /// effective number of corners, plus priors, minus what the parameters could have been.
-    pub fn ln_evidence_twice(&self, reduced: &Reduced, priors: &Priors) -> f64 {
+    pub fn ln_marginal_likelihood_twice(&self, reduced: &SchurComplement, priors: &Priors) -> f64 {
         self.share * 2.0 * self.log_likelihood() - priors.cost(&self.model)
             + self.smoothness.ln_prior_determinant(&self.model)
             - reduced.ln_determinant()

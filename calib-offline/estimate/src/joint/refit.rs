@@ -76,7 +76,7 @@ impl Estimate {
     /// [`EstimateError::Singular`] if the data leave a parameter open.
     pub fn board_peak_to_valley_mm(&mut self) -> Result<(f64, f64), EstimateError> {
         let (layout, _, reduced) = self.fit.equations(&self.observations)?;
-        let variances = reduced.global_variances();
+        let variances = reduced.marginal_variances();
         let board = self.observations.board;
         let shape: &BoardShape = &self.model.board_shape;
         let heights = (0..board.corner_count()).map(|k| {

@@ -3,7 +3,7 @@
 
 use super::components::Components;
 use super::normal_equations::{NormalEquations, parameters_to_columns};
-use super::reduced::{Eliminated, Reduced};
+use super::schur_complement::{Eliminated, SchurComplement};
 use crate::adjust::model::{Layout, Model};
 use crate::adjust::residual::linearize;
 use calib_rays::geometry::{PixelPoint, RigidTransform};
@@ -39,7 +39,7 @@ pub fn sighting_covariance(
     model: &Model,
     layout: &Layout,
     equations: &NormalEquations,
-    reduced: &Reduced,
+    reduced: &SchurComplement,
     pose_idx: usize,
     sightings: &[Sighting],
 ) -> Option<(DMatrix<f64>, DMatrix<f64>)> {

@@ -13,5 +13,5 @@ pub mod covariance;
 pub mod knots;
 mod moments;
 pub mod normal_equations;
-pub mod reduced;
+pub mod schur_complement;
 mod spline_block;

@@ -10,7 +10,7 @@
 
 use super::assembly::{self, EXTRINSICS, ViewSums};
 use super::components::Components;
-use super::reduced::{Eliminated, Reduced};
+use super::schur_complement::{Eliminated, SchurComplement};
 use super::spline_block::{BorderColumns, EliminatedSpline, SplineBlock};
 use crate::adjust::model::{CameraModel, Layout, Model, Step};
 use crate::adjust::objective::Weights;
@@ -201,7 +201,7 @@ impl NormalEquations {
     /// Factorizes. `damping` scales up the diagonal (Marquardt); 0 leaves the Hessian.
     ///
     /// `None` if a block is not positive definite: something the data do not determine.
-    pub fn reduce(&self, damping: f64) -> Option<Reduced> {
+    pub fn reduce(&self, damping: f64) -> Option<SchurComplement> {
         if self.splines.iter().any(Option::is_some) {
             return self.reduce_splines(damping);
         }
@@ -210,7 +210,7 @@ impl NormalEquations {
             right,
             factors,
         } = self.arrow.eliminate_poses(damping)?;
-        Some(Reduced {
+        Some(SchurComplement {
             border: BandedCholesky::of_dense(&shared)?,
             right,
             global_len: shared.nrows(),
@@ -219,7 +219,7 @@ impl NormalEquations {
     }
 
     /// With splines: they go first, each from its band.
-    fn reduce_splines(&self, damping: f64) -> Option<Reduced> {
+    fn reduce_splines(&self, damping: f64) -> Option<SchurComplement> {
         let arrow = &self.arrow;
         let global_len = arrow.shared.nrows();
         let size = global_len + 6 * arrow.poses.len();
@@ -253,7 +253,7 @@ impl NormalEquations {
         for spline in eliminated.iter().flatten() {
             spline.subtract_from(&mut border, &mut right);
         }
-        Some(Reduced {
+        Some(SchurComplement {
             border: BandedCholesky::of_dense(&border)?,
             right,
             global_len,
@@ -262,7 +262,7 @@ impl NormalEquations {
     }
 
     /// The step that the (damped) equations ask for.
-    pub fn step(&self, reduced: &Reduced) -> Step {
+    pub fn step(&self, reduced: &SchurComplement) -> Step {
         let mut border = reduced.right.clone();
         reduced.border.solve_vector(&mut border);
         match &reduced.eliminated {

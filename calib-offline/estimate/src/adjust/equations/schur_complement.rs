@@ -7,7 +7,7 @@ use nalgebra::{Cholesky, DVector};
 
 /// The factorized equations.
 #[derive(Debug, Clone)]
-pub struct Reduced {
+pub struct SchurComplement {
     /// Of the global parameters, and of the poses behind them if splines were eliminated.
     pub(super) border: BandedCholesky,
     pub(super) right: DVector<f64>,
@@ -22,7 +22,7 @@ pub(super) enum Eliminated {
     Splines(Vec<Option<EliminatedSpline>>),
 }
 
-impl Reduced {
+impl SchurComplement {
     /// Number of equations of poses behind those of the global parameters.
     pub(super) fn pose_columns(&self) -> usize {
         self.right.len() - self.global_len
@@ -30,7 +30,7 @@ impl Reduced {
 
     /// Variances of the global parameters (everything else marginalized), if the weights are
     /// inverse variances and the damping was 0.
-    pub fn global_variances(&self) -> DVector<f64> {
+    pub fn marginal_variances(&self) -> DVector<f64> {
         // Of the inverse of L L^T: the squared lengths of the columns of L^-1.
         let (n, size) = (self.global_len, self.right.len());
         let mut units = vec![0.0; size * n];
