@@ -42,7 +42,7 @@ pub trait ChessboardDetector: Sync {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ChessTopologicalDetector;
 
-/// SchurComplement sizes tried: half and quarter.
+/// Reduced sizes tried: half and quarter.
 const SMALLER: [Scale; 2] = [Scale(2.0), Scale(4.0)];
 /// Fractions of the pixels that are allowed to saturate when the image is stretched.
 const STRETCH_QUANTILES: [f64; 2] = [0.005, 0.995];
