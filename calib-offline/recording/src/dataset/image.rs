@@ -2,7 +2,7 @@
 
 use calib_rays::geometry::SensorSize;
 use calib_rays::remedy::Remedy;
-use image::{DynamicImage, ImageReader};
+use image::{DynamicImage, ImageFormat};
 use std::path::{Path, PathBuf};
 
 /// A gray image; values are the file's own code values (0 to [`GrayImage::white_level`]).
@@ -92,11 +92,12 @@ impl GrayImage {
             path: path.to_path_buf(),
             source,
         };
-        let reader = ImageReader::open(path)
-            .map_err(unreadable)?
-            .with_guessed_format()
-            .map_err(unreadable)?;
-        let decoded = reader.decode().map_err(|source| match source {
+        let bytes = std::fs::read(path).map_err(unreadable)?;
+        // From memory: the decoders are compiled once, in their own crate, and not for files here again.
+        let format = image::guess_format(&bytes)
+            .or_else(|unknown| ImageFormat::from_path(path).map_err(|_| unknown));
+        let decoded = format.and_then(|format| image::load_from_memory_with_format(&bytes, format));
+        let decoded = decoded.map_err(|source| match source {
             image::ImageError::IoError(source) => ImageError::Unreadable {
                 path: path.to_path_buf(),
                 source,
