@@ -8,3 +8,7 @@ pub mod evaluate;
 pub mod methods;
 pub mod pipeline;
 pub mod report;
+
+#[cfg(test)]
+#[path = "../tests/it/common/snapshot.rs"]
+mod snapshot;

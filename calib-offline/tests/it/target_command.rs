@@ -1,5 +1,6 @@
 //! `detect --target` through the real binary: what it writes, and what it refuses.
 
+use crate::common::documented::assert_documented;
 use crate::common::{contents, run};
 use calib_rays::progress::Silent;
 use calib_rays::remedy::Remedy as _;
@@ -57,6 +58,8 @@ fn markers_are_written_read_back_and_joined_into_the_simulators_matches() {
     .assert_code(0)
     .json();
     assert_eq!(object["schema"], "calib-offline/detect-target/1");
+    let target = std::slice::from_ref(&object);
+    assert_documented("detect", "calib-offline/detect-target/1", target, &[]);
     assert_eq!(
         (
             object["used"].as_u64(),
