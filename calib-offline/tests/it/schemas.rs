@@ -145,6 +145,7 @@ fn of_devices() {
             ("rig.cameras.name", owned),
             ("rig.cameras.width_px", owned),
             ("rig.cameras.height_px", owned),
+            ("slots.open_error", "a blob that was damaged in its slot"),
             ("update.identity", under_way),
             ("update.bytes", under_way),
             ("update.received_bytes", under_way),

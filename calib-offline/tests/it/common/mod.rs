@@ -17,6 +17,7 @@ pub mod against_truth;
 pub mod documented;
 pub mod halves;
 pub mod snapshot;
+pub mod standard;
 
 pub const BOARD: BoardSpec = BoardSpec {
     rows: 6,
