@@ -9,3 +9,7 @@ pub mod methods;
 pub mod pipeline;
 pub mod present;
 pub mod report;
+
+#[cfg(test)]
+#[path = "../tests/it/common/snapshot.rs"]
+mod snapshot;

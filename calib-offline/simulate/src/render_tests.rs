@@ -33,42 +33,65 @@ fn board_view(scene: &Scene, camera_idx: usize, pose: usize) -> PlateView<'_> {
     }
 }
 
-/// Brightness between pixels, by cubic convolution over 6 x 6 pixels.
-fn sample(image: &Rendered, u: f64, v: f64) -> f64 {
-    let weight = |x: f64| {
-        // Keys' kernel of fourth order.
-        let x = x.abs();
-        if x < 1.0 {
-            4.0 / 3.0 * x.powi(3) - 7.0 / 3.0 * x * x + 1.0
-        } else if x < 2.0 {
-            -7.0 / 12.0 * x.powi(3) + 3.0 * x * x - 59.0 / 12.0 * x + 2.5
-        } else if x < 3.0 {
-            x.powi(3) / 12.0 - 2.0 / 3.0 * x * x + 1.75 * x - 1.5
-        } else {
-            0.0
-        }
-    };
-    let (u0, v0) = (u.floor(), v.floor());
-    let mut sum = 0.0;
-    for j in -2..=3 {
-        for i in -2..=3 {
-            let (x, y) = (u0 + f64::from(i), v0 + f64::from(j));
-            let value = image.brightness[y as usize * image.sensor.width as usize + x as usize];
-            sum += f64::from(value) * weight(u - x) * weight(v - y);
+/// Brightness between pixels, by cubic convolution over 6 x 6 pixels: for places that are whole pixels
+/// apart, whose weights are the same.
+struct Sampler<'a> {
+    image: &'a Rendered,
+    /// Pixel before the place.
+    first: [i32; 2],
+    weights: [[f64; 6]; 2],
+}
+
+impl<'a> Sampler<'a> {
+    fn new(image: &'a Rendered, u: f64, v: f64) -> Self {
+        let weight = |x: f64| {
+            // Keys' kernel of fourth order.
+            let x = x.abs();
+            if x < 1.0 {
+                4.0 / 3.0 * x.powi(3) - 7.0 / 3.0 * x * x + 1.0
+            } else if x < 2.0 {
+                -7.0 / 12.0 * x.powi(3) + 3.0 * x * x - 59.0 / 12.0 * x + 2.5
+            } else if x < 3.0 {
+                x.powi(3) / 12.0 - 2.0 / 3.0 * x * x + 1.75 * x - 1.5
+            } else {
+                0.0
+            }
+        };
+        let along = |at: f64| [-2.0, -1.0, 0.0, 1.0, 2.0, 3.0].map(|i| weight(at - at.floor() - i));
+        Self {
+            image,
+            first: [u, v].map(|at| at.floor() as i32),
+            weights: [along(u), along(v)],
         }
     }
-    sum
+
+    /// So many pixels to the right of the place, and so many below.
+    fn at(&self, right: i32, down: i32) -> f64 {
+        let [u, v] = self.first;
+        let (u, v) = ((u + right - 2) as usize, (v + down - 2) as usize);
+        let width = self.image.sensor.width as usize;
+        let [along_u, along_v] = &self.weights;
+        let lines = along_v.iter().zip(v..).map(|(weight, v)| {
+            let line = &self.image.brightness[v * width + u..][..6];
+            let values = line.iter().zip(along_u);
+            weight
+                * values
+                    .map(|(value, weight)| f64::from(*value) * weight)
+                    .sum::<f64>()
+        });
+        lines.sum()
+    }
 }
 
 /// The point about which the image is most nearly unchanged by a half turn: a chessboard corner,
 /// or the middle of a ring, under any affine view.
 fn symmetry_center(image: &Rendered, start: PixelPoint, radius: i32) -> PixelPoint {
     let cost = |u: f64, v: f64| {
+        let sampler = Sampler::new(image, u, v);
         let mut sum = 0.0;
         for j in -radius..=radius {
             for i in -radius..=radius {
-                let (x, y) = (f64::from(i), f64::from(j));
-                let difference = sample(image, u + x, v + y) - sample(image, u - x, v - y);
+                let difference = sampler.at(i, j) - sampler.at(-i, -j);
                 sum += difference * difference;
             }
         }

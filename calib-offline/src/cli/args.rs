@@ -28,6 +28,13 @@ Results go to standard output, narration and progress to standard error. Files a
 or not at all. With --json, standard output holds one object with a \"schema\" field and nothing
 else, for errors too.";
 
+const SIMULATE_FORMATS: &str = "\
+With --json, schema calib-offline/simulate/1:
+  folder, optics, seed, camera_count, pose_count, corner_count, image_count, point_count
+  holdout_count, points_oracle_rms_mm, holdout_oracle_rms_mm
+  hull_share    share of each camera's image inside the hull of all corners
+  byte_count";
+
 /// Calibrates cameras with one ray per pixel, from a chessboard.
 #[derive(Debug, Parser)]
 #[command(name = "calib-offline", version, before_help = EXAMPLE, after_help = EXIT_CODES, max_term_width = 100)]
@@ -69,6 +76,6 @@ pub enum Verb {
     /// Pack a calibration for the device within a proven error
     Pack(pack::PackArgs),
     /// Make a dataset with known truth
-    #[command(before_help = SIMULATE_EXAMPLE)]
+    #[command(before_help = SIMULATE_EXAMPLE, after_help = SIMULATE_FORMATS)]
     Simulate(simulate::SimulateArgs),
 }

@@ -31,14 +31,21 @@ With --ray-tables it holds rays_NAME.npy too: for each pixel (row, column) six n
 precision, a point of its ray nearest to the camera (mm) and the unit direction into the scene, both in the
 rig's frame; NaN where there is no ray. Those of --method alternating are its own, pixel by pixel.
 
-With --json: schema calib-offline/calibrate/1, verdict, reasons, held_out_*, half_data_mm and
-half_data_ratio (points of two calibrations from half of the poses: RMS difference, and over what was
-predicted), central_model_mm (RMS by which a central model would move points; 0 for a central rig),
-rms_px, sigma_px, cameras (name, sensor_px, covered_share, views, central, centrality_rms_mm,
-offset_numbers: used and all), baseline_mm, working_distance_mm, counts of poses, views and corners,
-left_out, blob (bytes; max_error_px, and max_error_mm at the working distance; wanted_error_px: the error
-is larger than wanted only where f32 cannot say it better; curve: bytes of all tables, error_px, error_mm of
-other sizes), calibration, rig, report (the three files). A figure that does not apply is null.";
+With --json, schema calib-offline/calibrate/1; a figure that does not apply is null:
+  verdict, reasons
+  held_out_neighbor_percent, held_out_neighbor_mm, held_out_rigid_mm, held_out_rms_px
+  half_data_mm, half_data_ratio  points of two calibrations from half of the poses: RMS difference,
+                                 and over what was predicted
+  central_model_mm               RMS by which a central model would move points; 0 if central
+  rms_px, sigma_px
+  cameras (name, sensor_px, covered_share, views, central, centrality_rms_mm, offset_numbers)
+                                 offset_numbers: used, and all
+  baseline_mm, working_distance_mm (least, median, most)
+  poses_used, views_used, left_out, corners_used, corners_rejected
+  blob (bytes, max_error_px, max_error_mm, wanted_error_px, curve (bytes, error_px, error_mm))
+                                 mm at the working distance; larger than wanted only where f32
+                                 cannot say it better; curve: other sizes of all tables
+  calibration, rig, report       the three files";
 
 /// The blob's bound unless `pack` is asked for another, px: well below the noise of any corner.
 pub const BLOB_MAX_ERROR_PX: f64 = 0.001;

@@ -41,14 +41,18 @@ without it; where the truth is known, matches.csv and holdout.csv against it. Th
 -o holds index.html, and per dataset calibration.json, rig.rays and report.html.
 Exit code 1: a verdict is fail, or a device gave other bits than the host.
 
-With --json: schema calib-offline/demo/1, index, datasets, each with dataset, report, blob, the
-fields of calibrate, and measured: unseen_boards (folds, square_mm, blob_error_px; as_recorded: all
-pairs, as_used: those that the calibration does not leave out, each with pairs,
-neighbor_rms_percent, neighbor_rms_mm, neighbor_median_percent, rigid_rms_mm, points, outside, unmet),
-known_points (file, matches, without_point, errors: points, direct_rms_mm, placed_rms_mm,
-oracle_rms_mm, direct_ratio, placed_ratio), devices (device, slot, self_tests: equal and all, matches, points,
-different),
-no_cortex_m (why there is no Cortex-M among the devices).";
+With --json, schema calib-offline/demo/1:
+  index
+  datasets (dataset, the facts of calibrate, report, blob (as of calibrate), measured (
+    unseen_boards (folds, square_mm, blob_error_px, as_recorded/as_used (pairs,
+      neighbor_rms_percent, neighbor_rms_mm, neighbor_median_percent, rigid_rms_mm, points,
+      outside, unmet)),
+    known_points (file, matches, without_point, errors (points, direct_rms_mm, placed_rms_mm,
+      oracle_rms_mm, direct_ratio, placed_ratio)),
+    devices (device, slot, self_tests, matches, points, different),
+    no_cortex_m))
+as_used: without the pairs that the calibration leaves out; self_tests: equal, and all; no_cortex_m:
+why there is no Cortex-M among the devices";
 
 /// The datasets of the demo, folders of `data/`.
 const DATASETS: [&str; 2] = ["opencv-stereo", "stage"];

@@ -25,13 +25,19 @@ DATASET/corners.csv (camera,pose,row,col,u,v,sigma_px). Every image gets a verdi
 says why. The same corner has the same label in every image of every camera; what cannot be
 decided is an error. The overlay shows row 0 in orange and corner (0, 0) in a red square.
 
-With --json: schema calib-offline/detect/1, images (camera, pose, file, verdict, corner_count,
-partial, quarter_turns, reason, figures), turned, pair_checks, used, corner_count.
+With --json, schema calib-offline/detect/1:
+  images (camera, pose, file, verdict, corner_count, partial, quarter_turns, reason, figures (
+    contrast_percent, edge_px, square_px, residual_percent, sigma_px))
+  turned (camera, pose, quarter_turns)
+  pair_checks (first_camera, second_camera, poses, median_px, worst_pose, worst_px)
+  used, corner_count
 
 With --target, the ring markers of [target] are found in the target_images instead, and written to
 DATASET/markers.csv in the same format, their centers corrected for the perspective; pose counts the
-target images. --json: schema calib-offline/detect-target/1, images (camera, pose, file, verdict,
-marker_count, partial, quarter_turns, reason, figures), used, marker_count.";
+target images. With --json, schema calib-offline/detect-target/1:
+  images (camera, pose, file, verdict, marker_count, partial, quarter_turns, reason, figures (
+    contrast_percent, edge_px, radius_px, residual_percent, sigma_px, perspective_px))
+  used, marker_count";
 
 /// The arguments.
 #[derive(Debug, Args)]

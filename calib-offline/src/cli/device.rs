@@ -26,14 +26,21 @@ rollback  the blob in the other slot, after a check of all of it, becomes the on
 
 Exit code 1: the gaps say that the cameras have moved, or a self-test gave other bits.
 
-With --json: schema calib-offline/device-status/1 with device, firmware, uptime_ms, answered, refused,
-updates, rollbacks, max_blob_bytes, blob (identity, bytes, camera_count, cameras: name, width_px,
-height_px; or null), open_error, slots (state: empty, receiving, holds with is_active, sequence, bytes,
-checksum and identity, or unusable with sequence and open_error), update (identity, bytes,
-received_bytes), rig (serial, cameras), gaps (verdict: fits, shifted, scattered, too_few_points or
-nothing_predicted; points, mean_signed_mm, mean_size_mm, within_95_mm, predicted: points, mean_sigma_mm,
-shift, spread); schema calib-offline/device-selftest/1 with tests, equal, unanswered, worst_mm,
-worst_direction; schema calib-offline/device-rollback/1 with slot, sequence, bytes, identity.";
+With --json, status, schema calib-offline/device-status/1:
+  device, firmware, uptime_ms, answered, refused, updates, rollbacks, max_blob_bytes
+  blob (identity, bytes, camera_count, cameras (name, width_px, height_px)), open_error
+  slots (state, is_active, sequence, bytes, checksum, identity, open_error)
+                 state: empty, receiving, holds (all but open_error) or unusable (sequence,
+                 open_error)
+  update (identity, bytes, received_bytes)
+  rig (serial, cameras (name, width_px, height_px))
+  gaps (verdict, points, mean_signed_mm, mean_size_mm, within_95_mm, predicted (points,
+    mean_sigma_mm, shift, spread))
+                 verdict: fits, shifted, scattered, too_few_points or nothing_predicted
+With --json, selftest, schema calib-offline/device-selftest/1:
+  tests, equal, unanswered, worst_mm, worst_direction
+With --json, rollback, schema calib-offline/device-rollback/1:
+  slot, sequence, bytes, identity";
 
 /// The arguments.
 #[derive(Debug, Args)]

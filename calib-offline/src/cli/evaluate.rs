@@ -32,19 +32,23 @@ DIR holds fig7_spread, fig8_stage_angles, fig10_point_cloud and fig11_error_over
 .svg and .csv, table.md and evaluation.json. With --paper-set-up the figures are in a folder per
 recording: ten-poses and two-placements.
 
-evaluation.json, and --json: schema calib-offline/evaluate/1, publication (mean_mm, deviation_mm,
-comparable), files, evaluations, each with name, dataset, cameras, poses, corners,
-  methods       method, placed_poses, failed (why there is nothing of it)
-  spread        views, neurons, marker_pairs, best_px, best_left_out_rms_mm,
-                alternating_px, published_choice_left_out_rms_mm
-  stage_angles  methods: method, rms_deg, wobble_rms_deg, angles (pose, placement, dial_deg, error_deg)
-  target        markers, common, cloud_method, methods: method, without_point, errors, neighbor_rms_mm,
-                true_rms_mm, largest_pose_deviation_mm, poses (pose, distance_mm, errors,
-                neighbor_rms_mm, true_rms_mm); errors are count, mean_mm, deviation_mm, variance_mm2, rms_mm, worst_mm
-  known_points  matches, common, frame_is_true, methods: method, without_point, errors (points,
-                direct_rms_mm, placed_rms_mm, oracle_rms_mm, direct_ratio, placed_ratio), bins
-                (distance_mm, points, placed_rms_mm); oracle: bins
-  left_out      part, reason";
+evaluation.json, and --json, schema calib-offline/evaluate/1:
+  tool_version, publication (mean_mm, deviation_mm, comparable), files
+  evaluations (name, dataset, cameras, poses, corners, methods (method, placed_poses, failed),
+    spread (views, neurons, marker_pairs, best_px, best_left_out_rms_mm, alternating_px,
+      published_choice_left_out_rms_mm),
+    stage_angles (methods (method, rms_deg, wobble_rms_deg,
+      angles (pose, placement, dial_deg, error_deg))),
+    target (markers, common, cloud_method, methods (method, without_point,
+      errors (count, mean_mm, deviation_mm, variance_mm2, rms_mm, worst_mm),
+      neighbor_rms_mm, true_rms_mm, largest_pose_deviation_mm, poses (pose, distance_mm,
+        errors (count, mean_mm, deviation_mm, variance_mm2, rms_mm, worst_mm),
+        neighbor_rms_mm, true_rms_mm))),
+    known_points (matches, common, frame_is_true, methods (method, without_point,
+      errors (points, direct_rms_mm, placed_rms_mm, oracle_rms_mm, direct_ratio, placed_ratio),
+      bins (distance_mm, points, placed_rms_mm)), oracle (distance_mm, points, placed_rms_mm)),
+    left_out (part, reason))
+failed: why there is nothing of a method";
 
 /// Everything that may stand in a folder of figures.
 const FIGURE_FILES: [&str; 8] = [

@@ -24,8 +24,9 @@ multiple of 8, of 256 for uf2, whose last page is filled up with 0xff. The C sou
 array, aligned to 8, and its length NAME_len (ray-runtime/c/rays.h opens it). An earlier file of the same
 form is replaced; any other only with --force.
 
-With --json: schema calib-offline/export/1, output, format, blob_bytes, file_bytes, base_address, family and
-name (null where the form has none).";
+With --json, schema calib-offline/export/1:
+  output, format, blob_bytes, file_bytes
+  base_address, family, name    null where the form has none";
 
 /// The arguments.
 #[derive(Debug, Args)]

@@ -32,9 +32,10 @@ that of another --rig-serial. A device built for the owner of a key takes only b
 64 bytes, Ed25519, as OpenSSL 3 writes them:
   openssl pkeyutl -sign -inkey key.pem -rawin -in rig.rays -out rig.rays.sig
 
-With --json: schema calib-offline/flash/1, rig, device, slot, sequence, bytes, identity,
-was_active (true: the device had it in use already and nothing was sent), resumed (how often a broken
-transfer went on).";
+With --json, schema calib-offline/flash/1:
+  rig, device, slot, sequence, bytes, identity
+  was_active    true: the device had it in use already and nothing was sent
+  resumed       how often a broken transfer went on";
 
 /// The arguments.
 #[derive(Debug, Args)]

@@ -30,14 +30,19 @@ const FORMATS: &str = "\
 FILE is a dataset (its folder or its dataset.toml), a calibration.json or a blob. For a dataset it
 says which views and which parts of the sensor are covered, and what to record besides.
 
-With --json: schema calib-offline/inspect/1 and kind, which is
-  dataset      folder, rows, cols, square_mm, stage, excluded, source (corners, images or both),
-               cameras (name, sensor_px, images), capture (poses, poses_seen_by_all, cameras,
-               warnings; null before detect)
-  calibration  tool_version, method, input_sha256, and the facts that calibrate prints
-  blob         bytes, identity, frame, written_by, max_error_px, working_distance_mm, self_tests,
-               cameras (name, sensor_px, region_px, cells, form, central, position_mm),
-               pairs whose uncertainty it carries (cameras, nodes, bytes, noise_px)";
+With --json, kind dataset of schema calib-offline/inspect/1:
+  kind, folder, rows, cols, square_mm, stage, excluded
+  source     corners, images or both
+  cameras (name, sensor_px, images)
+  capture (poses, poses_seen_by_all, cameras (name, views, corners, corners_per_view,
+    covered_share, corners_per_ninth), warnings)
+             null before detect; corners_per_view: least, median, most
+With --json, kind calibration of schema calib-offline/inspect/1:
+  kind, tool_version, method, input_sha256, the facts of calibrate
+With --json, kind blob of schema calib-offline/inspect/1:
+  kind, bytes, identity, frame, written_by, max_error_px, working_distance_mm, self_tests
+  cameras (name, sensor_px, region_px, cells, form, central, position_mm)
+  pairs (cameras, nodes, bytes, noise_px)    whose uncertainty it carries";
 
 /// The arguments.
 #[derive(Debug, Args)]

@@ -42,8 +42,10 @@ evaluated in double precision. With --device the device measures, with the blob 
 same bits as that blob gives here; matches of two cameras, in the rig's frame.
 An earlier POINTS.csv is replaced; any other file only with --force.
 
-With --json: schema calib-offline/measure/1, rig (the device's address with --device), rig_kind (blob,
-calibration or device), frame, output, matches, ok, outside, parallel, behind, gap_rms_mm.";
+With --json, schema calib-offline/measure/1:
+  rig          the device's address with --device
+  rig_kind     blob, calibration or device
+  frame, output, matches, ok, outside, parallel, behind, gap_rms_mm";
 
 /// The arguments.
 #[derive(Debug, Args)]

@@ -39,14 +39,17 @@ much better. Intervals are 95 %, by drawing boards anew (fixed seed). -v tells t
 -o holds comparison.json (the object of --json), comparison.csv and comparison.md.
 Exit code 3: no method has an answer.
 
-With --json: schema calib-offline/compare/1, tool_version, input_sha256, square_mm, working_distance_mm,
-poses, views, corners, outliers, folds, boards, held_out_corners, common_corners, conclusion (sentences) and
-methods, each with method, title, failure (null, or why there is no answer), training (rms_px, corners,
-rejected), conversion_error_px (of the method's rays as a ray field), failed_folds (fold, reason),
-held_out (rms_px, median_px, neighbor_rms_percent, neighbor_rms_mm, rigid_rms_mm, points, unanswered),
-against_first (residual, neighbor, rigid: each ratio, low, high, boards) and truth (file, unanswered,
-errors: points, direct_rms_mm, placed_rms_mm, oracle_rms_mm, direct_ratio, placed_ratio). A figure
-that does not apply is null.";
+With --json, schema calib-offline/compare/1; a figure that does not apply is null:
+  tool_version, input_sha256, square_mm, working_distance_mm
+  poses, views, corners, outliers, folds, boards, held_out_corners, common_corners
+  conclusion             sentences
+  methods (method, title, failure, training (rms_px, corners, rejected), conversion_error_px,
+    failed_folds (fold, reason), held_out (rms_px, median_px, neighbor_rms_percent,
+      neighbor_rms_mm, rigid_rms_mm, points, unanswered),
+    against_first (residual/neighbor/rigid (ratio, low, high, boards)),
+    truth (file, unanswered, errors (points, direct_rms_mm, placed_rms_mm, oracle_rms_mm,
+      direct_ratio, placed_ratio)))
+failure: why there is no answer; conversion_error_px: of the method's rays as a ray field";
 
 /// Names of the files written, in the output folder.
 const FILES: [&str; 3] = ["comparison.json", "comparison.csv", "comparison.md"];

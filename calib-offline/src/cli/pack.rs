@@ -31,10 +31,16 @@ times the bytes (ray-runtime/COST.md has both). The uncertainty goes with it on 
 far that changes predicted standard deviations is measured and said. An earlier blob is replaced;
 any other file only with --force.
 
-With --json: schema calib-offline/pack/2, output, bytes, max_error_px (asked for; null with only
---max-bytes), worst_error_px and worst_error_mm (found; mm at the working distance), cameras (name,
-form, central, cells, bytes, worst_error_px, worst_error_mm), pairs (cameras, nodes, bytes; sigma_error
-and calibration_sigma_error: rms and worst, relative), curve (bytes of all tables, error_px, error_mm).";
+With --json, schema calib-offline/pack/2:
+  output, bytes
+  max_error_px      asked for; null with only --max-bytes
+  worst_error_px, worst_error_mm
+                    found; mm at the working distance
+  cameras (name, form, central, cells, bytes, worst_error_px, worst_error_mm)
+  pairs (cameras, nodes, bytes, sigma_error/calibration_sigma_error (rms, worst))
+                    relative
+  curve (bytes, error_px, error_mm)
+                    bytes of all tables";
 
 /// The arguments.
 #[derive(Debug, Args)]

@@ -212,71 +212,66 @@ fn truth(comparison: &Comparison) -> Option<String> {
 mod tests {
     use super::*;
     use crate::compare::example::example;
+    use crate::snapshot::assert_snapshot;
 
-    fn with_ratio(ratio: f64, low: f64, high: f64) -> String {
-        let mut comparison = example();
-        let ratio = Ratio {
+    fn ratio(ratio: f64, low: f64, high: f64) -> Ratio {
+        Ratio {
             ratio,
             low,
             high,
             boards: 20,
-        };
-        comparison.methods[1].against_first = Some(Ratios {
-            residual: Some(ratio),
-            neighbor: None,
-            rigid: None,
-        });
-        conclude(&comparison).join("\n")
+        }
     }
 
     #[test]
     fn only_what_is_certain_and_matters_is_called_a_difference() {
-        assert!(with_ratio(0.8, 0.7, 0.9).contains("not enough here"));
-        assert!(with_ratio(0.8, 0.7, 1.1).contains("enough here: ray field"));
-        assert!(with_ratio(0.98, 0.97, 0.99).contains("enough here: ray field"));
-        assert!(with_ratio(1.2, 1.1, 1.3).contains("A pinhole is better here"));
+        for (found, expected) in [
+            (ratio(0.8, 0.7, 0.9), Says::Better),
+            (ratio(0.8, 0.7, 1.1), Says::Same),
+            (ratio(0.98, 0.97, 0.99), Says::Same),
+            (ratio(1.2, 1.1, 1.3), Says::Worse),
+        ] {
+            assert_eq!(says(&found), expected, "{found:?}");
+        }
     }
 
     #[test]
-    fn measures_that_disagree_are_both_named() {
-        let mut comparison = example();
-        let ratio = |ratio: f64| {
-            Some(Ratio {
-                ratio,
-                low: ratio - 0.01,
-                high: ratio + 0.01,
-                boards: 20,
-            })
+    fn every_conclusion_in_words() {
+        let with_ratios = |residual, neighbor, rigid| {
+            let mut comparison = example();
+            comparison.methods[1].against_first = Some(Ratios {
+                residual: Some(residual),
+                neighbor,
+                rigid,
+            });
+            comparison
         };
-        comparison.methods[1].against_first = Some(Ratios {
-            residual: ratio(0.5),
-            neighbor: ratio(1.5),
-            rigid: ratio(1.0),
+        let failed = |method: usize, why: &str| {
+            let mut comparison = example();
+            comparison.methods[method].failure = Some(why.to_owned());
+            comparison.methods[1].against_first = None;
+            comparison
+        };
+        let about = |at: f64| ratio(at, at - 0.01, at + 0.01);
+        let cases = [
+            ("better", with_ratios(about(0.8), None, None)),
+            ("the same", with_ratios(ratio(0.8, 0.7, 1.1), None, None)),
+            ("worse", with_ratios(about(1.2), None, None)),
+            (
+                "measures that disagree",
+                with_ratios(about(0.5), Some(about(1.5)), Some(about(1.0))),
+            ),
+            (
+                "without the first",
+                failed(0, "it sees more than a half space"),
+            ),
+            ("without the second", failed(1, "singular")),
+        ];
+        let text = cases.map(|(name, comparison)| {
+            let lines = conclude(&comparison);
+            assert!(!lines.is_empty(), "{name}");
+            format!("{name}:\n{}\n", lines.join("\n"))
         });
-        let text = conclude(&comparison).join("\n");
-        assert!(text.contains("Neither is better throughout"), "{text}");
-        assert!(
-            text.contains("50 % less") && text.contains("50 % more"),
-            "{text}"
-        );
-    }
-
-    #[test]
-    fn a_method_without_an_answer_says_why_and_the_other_stands() {
-        let mut comparison = example();
-        comparison.methods[0].failure = Some("it sees more than a half space".to_owned());
-        let text = conclude(&comparison).join("\n");
-        assert!(text.contains("no model here: it sees more than a half space"));
-        assert!(
-            text.contains("ray field, joint, on boards it never saw"),
-            "{text}"
-        );
-        let mut comparison = example();
-        comparison.methods[1].failure = Some("singular".to_owned());
-        let text = conclude(&comparison).join("\n");
-        assert!(
-            text.contains("ray field, joint: no answer: singular."),
-            "{text}"
-        );
+        assert_snapshot("conclusions", &text.join("\n"));
     }
 }

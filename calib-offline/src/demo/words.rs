@@ -85,3 +85,78 @@ fn of_device(check: &DeviceCheck) -> String {
         check.device, check.slot, check.matches, check.points
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::demo::page::{Entry, page};
+    use crate::evaluate::known_points::TruthErrors;
+    use crate::snapshot::{assert_snapshot, visible_text};
+
+    fn boards(pairs: usize, unmet: usize) -> BoardFigures {
+        BoardFigures {
+            pairs,
+            neighbor_rms_percent: 0.152,
+            neighbor_rms_mm: 0.0152,
+            neighbor_median_percent: 0.08,
+            rigid_rms_mm: 0.0113,
+            points: 195 * pairs,
+            outside: 7,
+            unmet,
+        }
+    }
+
+    fn known(errors: Option<TruthErrors>) -> KnownPoints {
+        KnownPoints {
+            file: "matches.csv".to_owned(),
+            matches: 500,
+            without_point: 2,
+            errors,
+        }
+    }
+
+    fn device(different: usize) -> DeviceCheck {
+        DeviceCheck {
+            device: "Cortex-M4F".to_owned(),
+            slot: 1,
+            self_tests: [16, 16],
+            matches: 500,
+            points: 498,
+            different,
+        }
+    }
+
+    #[test]
+    fn all_that_was_measured_in_words() {
+        let measured = Measured {
+            unseen_boards: Some(UnseenBoards {
+                folds: 5,
+                square_mm: 10.0,
+                as_recorded: boards(34, 3),
+                as_used: boards(32, 0),
+                blob_error_px: 0.001,
+            }),
+            known_points: vec![
+                known(Some(TruthErrors {
+                    points: 498,
+                    direct_rms_mm: 0.022,
+                    placed_rms_mm: 0.021,
+                    oracle_rms_mm: 0.02,
+                    direct_ratio: 1.1,
+                    placed_ratio: 1.05,
+                })),
+                known(None),
+            ],
+            devices: vec![device(0), device(3)],
+            no_cortex_m: Some("no QEMU".to_owned()),
+        };
+        let page = page(&[Entry {
+            name: "recording",
+            verdict: "pass",
+            measured: &measured,
+            report: "recording/report.html".to_owned(),
+        }]);
+        assert!(page.contains("href=\"recording/report.html\""));
+        assert_snapshot("demo", &visible_text(&page));
+    }
+}

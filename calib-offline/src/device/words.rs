@@ -107,10 +107,100 @@ fn duration(ms: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::device::state::{BlobState, GapState, RigState, UpdateState};
+    use crate::snapshot::assert_snapshot;
+    use ray_device::health::{GapReport, Predicted};
 
     #[test]
     fn times_are_told_in_fitting_units() {
         let told = [0, 119_999, 120_000, 7_200_000, 172_800_000].map(duration);
         assert_eq!(told, ["0 s", "119 s", "2 min", "2 h", "2 days"]);
+    }
+
+    fn cameras() -> Vec<CameraState> {
+        let of_one = |name: &str| CameraState {
+            name: name.to_owned(),
+            width_px: 1280,
+            height_px: 1024,
+        };
+        vec![of_one("left"), of_one("right")]
+    }
+
+    fn empty() -> DeviceState {
+        DeviceState {
+            device: "camera".to_owned(),
+            firmware: "1.2".to_owned(),
+            uptime_ms: 7_200_000,
+            answered: 12,
+            refused: 1,
+            updates: 2,
+            rollbacks: 0,
+            max_blob_bytes: 65536,
+            blob: None,
+            open_error: None,
+            slots: [SlotState::Empty, SlotState::Receiving],
+            update: None,
+            rig: None,
+            gaps: None,
+        }
+    }
+
+    #[test]
+    fn every_state_in_words() {
+        let holds = |is_active, sequence| SlotState::Holds {
+            is_active,
+            sequence,
+            bytes: 48320,
+            checksum: "0badcafe".to_owned(),
+            identity: "9f2c4e".to_owned(),
+        };
+        let measuring = DeviceState {
+            blob: Some(BlobState {
+                identity: "9f2c4e".to_owned(),
+                bytes: 48320,
+                camera_count: 3,
+                cameras: cameras(),
+            }),
+            slots: [holds(true, 3), holds(false, 2)],
+            update: Some(UpdateState {
+                identity: "51ab".to_owned(),
+                bytes: 1000,
+                received_bytes: 512,
+            }),
+            rig: Some(RigState {
+                serial: "A 17".to_owned(),
+                cameras: cameras(),
+            }),
+            gaps: Some(GapState {
+                verdict: "fits",
+                report: GapReport {
+                    points: 1000,
+                    mean_signed_mm: -0.001,
+                    mean_size_mm: 0.008,
+                    within_95_mm: 0.02,
+                    predicted: Some(Predicted {
+                        points: 1000,
+                        mean_sigma_mm: 0.01,
+                        shift: -0.1,
+                        spread: 1.02,
+                    }),
+                },
+            }),
+            ..empty()
+        };
+        let damaged = DeviceState {
+            open_error: Some(5),
+            slots: [
+                SlotState::Unusable {
+                    sequence: 4,
+                    open_error: 5,
+                },
+                SlotState::Empty,
+            ],
+            ..empty()
+        };
+        let states = [empty(), measuring, damaged];
+        let text = states.map(|state| state_in_words(&state));
+        assert_snapshot("device_state", &text.join("\n\n"));
     }
 }

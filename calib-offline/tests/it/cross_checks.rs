@@ -2,7 +2,8 @@
 //! and telling where it is not.
 
 use crate::common::against_truth::{run_scene, run_views, scene};
-use crate::common::halves::{checked, halves_of, halves_of_one_camera, names};
+use crate::common::halves::{checked, halves_of_one_camera, names};
+use crate::common::standard::standard;
 use calib_offline::evaluate::central_model::CentralModel;
 use calib_offline::evaluate::cross_check;
 use calib_offline::evaluate::half_data::{HalfDataCheck, Skipped};
@@ -20,8 +21,7 @@ fn halves_differ_as_predicted() {
     for optics in [OpticsKind::Brown, OpticsKind::Port] {
         let (mut squares, mut variance) = (0.0, 0.0);
         for seed in 1..=SEEDS {
-            let scene = scene(optics, |s| s.seed = seed);
-            let halves = halves_of(&scene, &scene.observe_corners());
+            let halves = standard(optics, seed).halves();
             squares += halves.ratio.powi(2) / SEEDS as f64;
             variance += 2.0 / halves.modes / (SEEDS * SEEDS) as f64;
         }
@@ -50,7 +50,9 @@ fn a_camera_that_changes_between_poses_is_seen() {
     let (estimate, findings) = run_views(&scene, &views);
     assert_eq!(findings, []);
     assert!(estimate.noise.variance_px2.sqrt() < 1.1 * scene.settings.noise_px);
-    let halves = halves_of(&scene, &views);
+    let HalfDataCheck::Compared(halves) = checked(&scene, &estimate).half_data else {
+        panic!("its poses make two halves");
+    };
     // Points differ in scale by 0.02 % of the calibrated volume's size, a multiple of the noise.
     assert!(halves.is_larger() && halves.ratio > 3.0, "{halves:?}");
 }
@@ -109,10 +111,9 @@ fn error_mm(scene: &Scene, rig: &Rig, matches: &[Match]) -> f64 {
 
 #[test]
 fn centrality_and_the_cost_of_a_central_model_are_the_true_ones() {
-    let scene = scene(OpticsKind::Port, |_| ());
-    let (estimate, _) = run_scene(&scene);
+    let found = standard(OpticsKind::Port, 1);
+    let (scene, estimate, checks) = (&found.scene, &found.estimate, found.checks());
     let rig = estimate.rig(&names());
-    let checks = checked(&scene, &estimate);
     for (k, found) in checks.centrality.iter().enumerate() {
         let rays: Vec<Ray> = rig.cameras[k]
             .coverage
@@ -135,17 +136,17 @@ fn centrality_and_the_cost_of_a_central_model_are_the_true_ones() {
     let CentralModel::Costs {
         evidence_loss,
         points: Some(points),
-    } = checks.central_model
+    } = &checks.central_model
     else {
         panic!("{:?}", checks.central_model);
     };
     let central = estimate.made_central().unwrap();
     let matches = matches_at(&rig, &span(&estimate.board_distances_mm(&rig)));
-    let central_mm = error_mm(&scene, &central.estimate.rig(&names()), &matches);
-    let own_mm = error_mm(&scene, &rig, &matches);
+    let central_mm = error_mm(scene, &central.estimate.rig(&names()), &matches);
+    let own_mm = error_mm(scene, &rig, &matches);
     // What the data say that a central model costs is what it truly costs, but for the rig's own
     // error: both are distances from the same points.
-    assert!(evidence_loss > 100.0);
+    assert!(*evidence_loss > 100.0);
     assert!(own_mm < 0.3 * central_mm, "{own_mm}, {central_mm}");
     assert!(
         (points.rms_mm - central_mm).abs() < own_mm,
@@ -157,9 +158,7 @@ fn centrality_and_the_cost_of_a_central_model_are_the_true_ones() {
 
 #[test]
 fn a_central_rig_loses_nothing_by_being_central() {
-    let scene = scene(OpticsKind::Brown, |_| ());
-    let (estimate, _) = run_scene(&scene);
-    let checks = checked(&scene, &estimate);
+    let checks = standard(OpticsKind::Brown, 1).checks();
     let CentralModel::IsCentral {
         offsets_gain: Some(gain),
     } = checks.central_model

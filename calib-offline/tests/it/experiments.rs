@@ -1,5 +1,6 @@
 //! The publication's experiments on small simulated datasets.
 
+use crate::common::documented::{assert_documented, assert_listed};
 use crate::common::{MANIFEST, contents, corners_csv, dataset, run};
 use calib_offline::compare::publication::figures::figures;
 use calib_offline::compare::publication::tables::tables;
@@ -10,8 +11,11 @@ use calib_rays::board::BoardSpec;
 use calib_rays::progress::Silent;
 use calib_recording::dataset::Dataset;
 use calib_simulate::{OpticsKind, OutputSettings, Scene, SceneSettings, write_dataset};
+use serde_json::json;
 use std::fs;
 use std::path::Path;
+
+const SCHEMA: &str = "calib-offline/evaluate/1";
 
 const FEW: ExperimentSettings = ExperimentSettings {
     spreads: 7,
@@ -41,6 +45,22 @@ fn a_simulated_recording_has_every_part_and_joint_is_near_the_oracle() {
     simulated(&folder, true, |_| {});
     let found = evaluated(&folder);
     assert!(found.left_out.is_empty(), "{:?}", found.left_out);
+    let (of_command, complete) = ("the command adds it", "nothing is left out");
+    assert_documented(
+        "evaluate",
+        SCHEMA,
+        &[json!({ "evaluations": [found] })],
+        &[
+            ("tool_version", of_command),
+            ("publication", of_command),
+            ("publication.mean_mm", of_command),
+            ("publication.deviation_mm", of_command),
+            ("publication.comparable", of_command),
+            ("files", of_command),
+            ("evaluations.left_out.part", complete),
+            ("evaluations.left_out.reason", complete),
+        ],
+    );
     assert!(found.methods.iter().all(|m| m.placed_poses == 18));
 
     let known = found.known_points.as_ref().unwrap();
@@ -211,7 +231,7 @@ fn the_command_writes_all_files_and_takes_away_those_of_an_earlier_run() {
     let object = run(home.path(), &["evaluate", "set", "-o", "out", "--json"])
         .assert_code(0)
         .json();
-    assert_eq!(object["schema"], "calib-offline/evaluate/1");
+    assert_listed("evaluate", SCHEMA, std::slice::from_ref(&object));
     let mut names: Vec<String> = fs::read_dir(home.path().join("out"))
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())

@@ -2,6 +2,7 @@
 //! oracle, which triangulates the same noisy pixels with the true rays.
 
 use crate::common::against_truth::{measure, run_scene, scene};
+use crate::common::standard::standard;
 use calib_estimate::adjust::StopReason;
 use calib_simulate::OpticsKind;
 
@@ -12,10 +13,9 @@ const DRAW: f64 = 0.005;
 fn a_pinhole_rig_reaches_the_oracle() {
     let ratios: Vec<f64> = (1..=3)
         .map(|seed| {
-            let scene = scene(OpticsKind::Brown, |s| s.seed = seed);
-            let (estimate, findings) = run_scene(&scene);
-            assert_eq!(findings, [], "seed {seed}");
-            measure(&scene, &estimate, true).ratio
+            let found = standard(OpticsKind::Brown, seed);
+            assert_eq!(found.findings, [], "seed {seed}");
+            measure(&found.scene, &found.estimate, true).ratio
         })
         .collect();
     let mean = ratios.iter().sum::<f64>() / 3.0;
@@ -72,12 +72,12 @@ fn strong_bumps_are_followed_and_ports_are_non_central() {
         (OpticsKind::Window, 1.023),
         (OpticsKind::Fisheye, 1.028),
     ] {
-        let scene = scene(optics, |_| ());
-        let (estimate, findings) = run_scene(&scene);
-        let measured = measure(&scene, &estimate, true);
-        assert_eq!(findings, [], "{optics:?}");
+        let found = standard(optics, 1);
+        let measured = measure(&found.scene, &found.estimate, true);
+        assert_eq!(found.findings, [], "{optics:?}");
         assert!(measured.ratio < limit, "{optics:?}: {measured:?}");
-        let central = estimate.model.cameras.iter().all(|c| c.field.is_central());
+        let cameras = &found.estimate.model.cameras;
+        let central = cameras.iter().all(|c| c.field.is_central());
         assert_eq!(central, optics == OpticsKind::Bumps);
     }
 }

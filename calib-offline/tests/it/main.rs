@@ -15,6 +15,7 @@ mod export_command;
 mod joint_estimate;
 mod methods;
 mod point_sigma;
+mod schemas;
 mod starting_points;
 mod target_command;
 mod uncertainty;

@@ -1,5 +1,6 @@
 //! `methods`, driven as a user drives it, on simulated recordings.
 
+use crate::common::documented::assert_documented;
 use crate::common::{MANIFEST, contents, corners_csv, dataset, run};
 use calib_estimate::adjust::Observations;
 use calib_offline::compare::{compare_methods, words};
@@ -42,7 +43,13 @@ fn behind_a_port_the_ray_field_gains_and_the_files_say_so() {
     let arguments = ["methods", "set", "-o", "out", "--json"];
     let first = run(folder.path(), &arguments);
     let object = first.assert_code(0).json();
-    assert_eq!(object["schema"], "calib-offline/compare/1");
+    let answered = "every method has an answer for every fold";
+    assert_documented(
+        "methods",
+        "calib-offline/compare/1",
+        std::slice::from_ref(&object),
+        &["methods.failed_folds.fold", "methods.failed_folds.reason"].map(|key| (key, answered)),
+    );
     assert_eq!(
         (&object["poses"], &object["folds"]),
         (&14.into(), &5.into())

@@ -1,7 +1,7 @@
 //! Predicted standard deviations of points: the blob against the calibration, and what `measure`
 //! writes with either.
 
-use crate::common::against_truth::{run_scene, scene};
+use crate::common::standard::standard;
 use crate::common::{SENSOR, calibration, project, run};
 use calib_blob::matches::BlobSource;
 use calib_blob::pack::{AlignedBytes, PackSettings, pack};
@@ -24,14 +24,14 @@ const MOST_RMS: f64 = 0.05;
 
 /// The points of a match list along each axis, in the rig's frame and in a camera's.
 fn assert_agreement(optics: OpticsKind) {
-    let scene = scene(optics, |settings| settings.seed = 5);
-    let (mut estimate, _) = run_scene(&scene);
+    let found = standard(optics, 1);
+    let mut estimate = found.estimate.clone();
     let mut rig = estimate.rig(&["left".to_string(), "right".to_string()]);
     estimate.fill_uncertainty(&mut rig).unwrap();
     let result = pack(&rig, &PackSettings::default()).unwrap();
     let bytes = AlignedBytes::from(result.bytes.as_slice());
     let blob = RayBlob::open(&bytes).unwrap();
-    let matches = scene.matches(MatchSet::Points, 1500);
+    let matches = found.scene.matches(MatchSet::Points, 1500);
     for frame in [None, Some("right")] {
         let ours = RigSource::new(&rig, frame).unwrap();
         let theirs = BlobSource::new(&blob, frame).unwrap();

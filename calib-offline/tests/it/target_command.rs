@@ -1,5 +1,6 @@
 //! `detect --target` through the real binary: what it writes, and what it refuses.
 
+use crate::common::documented::assert_documented;
 use crate::common::{contents, run};
 use calib_rays::progress::Silent;
 use calib_rays::remedy::Remedy as _;
@@ -7,23 +8,32 @@ use calib_recording::dataset::{Dataset, load_markers};
 use calib_recording::detect::ring_target::{TargetSettings, join_markers, target_views};
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
-/// A simulated dataset with corners and images of the target, smaller than usual.
+/// A simulated dataset with corners and images of the target, smaller than usual, made once.
 fn dataset() -> tempfile::TempDir {
+    static FILES: LazyLock<BTreeMap<PathBuf, Vec<u8>>> = LazyLock::new(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let size = ["--sensor", "640x512", "--angles", "-20:10:20"];
+        let start = ["simulate", "-o", "set", "--target", "ring"];
+        run(folder.path(), &[&start[..], &size].concat()).assert_code(0);
+        let files = contents(folder.path()).into_iter();
+        let below = |place: &str| {
+            let place = Path::new(place).strip_prefix(folder.path());
+            place.unwrap().to_owned()
+        };
+        files
+            .filter(|(place, _)| !place.ends_with('/'))
+            .map(|(place, bytes)| (below(&place), bytes))
+            .collect()
+    });
     let folder = tempfile::tempdir().unwrap();
-    let arguments = [
-        "simulate",
-        "-o",
-        "set",
-        "--sensor",
-        "640x512",
-        "--angles",
-        "-20:10:20",
-        "--target",
-        "ring",
-    ];
-    run(folder.path(), &arguments).assert_code(0);
+    for (place, bytes) in &*FILES {
+        let place = folder.path().join(place);
+        fs::create_dir_all(place.parent().unwrap()).unwrap();
+        fs::write(place, bytes).unwrap();
+    }
     folder
 }
 
@@ -57,6 +67,8 @@ fn markers_are_written_read_back_and_joined_into_the_simulators_matches() {
     .assert_code(0)
     .json();
     assert_eq!(object["schema"], "calib-offline/detect-target/1");
+    let target = std::slice::from_ref(&object);
+    assert_documented("detect", "calib-offline/detect-target/1", target, &[]);
     assert_eq!(
         (
             object["used"].as_u64(),

@@ -1,15 +1,15 @@
 //! Predicted uncertainty against the scatter over many noise draws.
 
-use crate::common::against_truth::{Coverage, coverage, run_scene, scene};
+use crate::common::against_truth::{Coverage, coverage};
+use crate::common::standard::standard;
 use calib_simulate::{MatchSet, OpticsKind};
 
 #[test]
 fn ellipsoids_cover_as_often_as_they_say() {
     let draws: Vec<Coverage> = (1..=4)
         .map(|seed| {
-            let scene = scene(OpticsKind::Brown, |s| s.seed = seed);
-            let (mut estimate, _) = run_scene(&scene);
-            coverage(&scene, &mut estimate, MatchSet::Points)
+            let found = standard(OpticsKind::Brown, seed);
+            coverage(&found.scene, &mut found.estimate.clone(), MatchSet::Points)
         })
         .collect();
     let mean = |of: fn(&Coverage) -> f64| draws.iter().map(of).sum::<f64>() / draws.len() as f64;

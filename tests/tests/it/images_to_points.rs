@@ -2,6 +2,7 @@
 //! whose rays all meet, and with optics whose rays do not. The blob is flashed to the host's device and to
 //! the Cortex-M in QEMU, which keep it through a restart and give the host's bits.
 
+use calib_blob::pack::AlignedBytes;
 use calib_estimate::adjust::residual::linearize;
 use calib_offline::demo::DeviceCheck;
 use calib_offline::demo::device::check;
@@ -26,14 +27,13 @@ use workspace_tests::{
 /// is for what the detector gets wrong in the same way everywhere.
 const MOST_RATIO: f64 = 1.03;
 
-/// The chain up to the device; the scene and its calibration for further questions.
-fn chain(optics: OpticsKind) -> (Scene, Calibration) {
+/// The chain up to the device; the scene, its calibration and the blob for further questions.
+fn chain(optics: OpticsKind) -> (Scene, Calibration, AlignedBytes) {
     let folder = tempfile::tempdir().unwrap();
     let scene = small_scene(optics, 11);
     let dataset = record(&scene, true, &folder.path().join("set"));
     let calibration = calibrate(&dataset, 0).calibration;
-    let packed = packed(&calibration);
-    let blob = aligned(&packed);
+    let blob = aligned(&packed(&calibration));
     for set in [MatchSet::Points, MatchSet::Holdout] {
         let (errors, without_point) = measure_on_device(&blob, &scene, set);
         println!("{optics:?} {set:?}: {errors:?}, {without_point} without a point");
@@ -47,34 +47,32 @@ fn chain(optics: OpticsKind) -> (Scene, Calibration) {
         // The corners that were found reach as far as the true ones, but for those at the border.
         assert!(without_point < 500 / 20, "{set:?}: {without_point}");
     }
-    (scene, calibration)
+    (scene, calibration, blob)
 }
 
 #[test]
 fn central_optics() {
-    let (scene, calibration) = chain(OpticsKind::Brown);
+    let (scene, calibration, blob) = chain(OpticsKind::Brown);
     let cameras = &calibration.rig.cameras;
     assert!(cameras.iter().all(|camera| camera.field.is_central()));
-    every_pixel_has_the_ray_of_the_field(&calibration);
-    devices_keep_the_blob_and_give_the_bits_of_the_host(&scene, &calibration);
+    every_pixel_has_the_ray_of_the_field(&calibration, &blob);
+    devices_keep_the_blob_and_give_the_bits_of_the_host(&scene, &blob);
 }
 
 #[test]
 fn rays_that_do_not_meet() {
-    let (scene, calibration) = chain(OpticsKind::Port);
+    let (scene, calibration, blob) = chain(OpticsKind::Port);
     let cameras = &calibration.rig.cameras;
     assert!(cameras.iter().all(|camera| !camera.field.is_central()));
-    every_pixel_has_the_ray_of_the_field(&calibration);
-    devices_keep_the_blob_and_give_the_bits_of_the_host(&scene, &calibration);
+    every_pixel_has_the_ray_of_the_field(&calibration, &blob);
+    devices_keep_the_blob_and_give_the_bits_of_the_host(&scene, &blob);
 }
 
 /// The blob on its way through a file and the runtime, against the calibration on its way through
 /// JSON: at the working distance no ray is 0.001 px off, by a yardstick that is not the packer's.
-fn every_pixel_has_the_ray_of_the_field(calibration: &Calibration) {
+fn every_pixel_has_the_ray_of_the_field(calibration: &Calibration, bytes: &[u8]) {
     let distance_mm = working_distance_mm(calibration);
-    let packed = packed(calibration);
-    let blob = aligned(&packed);
-    let blob = RayBlob::open(&blob).unwrap();
+    let blob = RayBlob::open(bytes).unwrap();
     for (idx, camera) in calibration.rig.cameras.iter().enumerate() {
         let camera_from_rig = camera.rig_from_camera.inverse();
         let sensor = camera.field.sensor;
@@ -103,10 +101,8 @@ fn every_pixel_has_the_ray_of_the_field(calibration: &Calibration) {
 
 /// Flashes the blob to both devices, switches them off and on, and compares their answers with the
 /// runtime's here. Needs QEMU and a bare-metal toolchain; `tests/run` installs them first.
-fn devices_keep_the_blob_and_give_the_bits_of_the_host(scene: &Scene, calibration: &Calibration) {
-    let packed = packed(calibration);
-    let bytes = aligned(&packed);
-    let blob = RayBlob::open(&bytes).unwrap();
+fn devices_keep_the_blob_and_give_the_bits_of_the_host(scene: &Scene, bytes: &[u8]) {
+    let blob = RayBlob::open(bytes).unwrap();
     // So what is compared are standard deviations as well.
     assert_eq!(blob.uncertain_pairs().count(), 1);
     let asked = pairs(scene, 500);
@@ -125,7 +121,7 @@ fn devices_keep_the_blob_and_give_the_bits_of_the_host(scene: &Scene, calibratio
         assert_eq!(client.status().unwrap().blob.is_err(), is_new);
         drop(client);
         expect(
-            check(device.address(), &blob, &bytes, &asked).unwrap(),
+            check(device.address(), &blob, bytes, &asked).unwrap(),
             "firmware-sim cortex-m",
         );
     };
@@ -134,7 +130,7 @@ fn devices_keep_the_blob_and_give_the_bits_of_the_host(scene: &Scene, calibratio
     let FlashFile { flash, kept_in } = FlashFile::open(&file, None).unwrap();
     let device = SimulatedDevice::start_with(loopback(), flash).unwrap();
     expect(
-        check(device.address(), &blob, &bytes, &asked).unwrap(),
+        check(device.address(), &blob, bytes, &asked).unwrap(),
         "firmware-sim host",
     );
     drop(kept_in);

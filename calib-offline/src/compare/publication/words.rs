@@ -247,3 +247,148 @@ fn published_table(evaluations: &[Evaluation]) -> String {
     }
     table.left_aligned().markdown()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::spread::SpreadPoint;
+    use super::super::stage::{MethodAngles, StageAngle};
+    use super::super::statistics::ErrorStatistics;
+    use super::super::{LeftOut, MethodOutcome, known::KnownMethod};
+    use super::*;
+    use crate::evaluate::known_points::TruthErrors;
+    use crate::snapshot::assert_snapshot;
+
+    fn empty(name: &str) -> Evaluation {
+        Evaluation {
+            name: name.to_owned(),
+            dataset: None,
+            cameras: vec!["left".to_owned(), "right".to_owned()],
+            poses: 18,
+            corners: 3510,
+            methods: Vec::new(),
+            spread: None,
+            stage_angles: None,
+            target: None,
+            known_points: None,
+            left_out: Vec::new(),
+        }
+    }
+
+    fn networks() -> SpreadExperiment {
+        let point = |spread_px, left_out_rms_mm, marker_rms_mm| SpreadPoint {
+            spread_px,
+            training_rms_mm: 0.5 * left_out_rms_mm,
+            left_out_rms_mm,
+            marker_rms_mm,
+        };
+        SpreadExperiment {
+            views: 4,
+            neurons: 48,
+            marker_pairs: 12,
+            published: vec![
+                point(1000.0, 0.01, Some(0.3)),
+                point(7000.0, 0.02, Some(0.2)),
+            ],
+            wide: vec![point(100.0, 5.0, None), point(400.0, 0.008, Some(0.25))],
+            best_px: 400.0,
+            best_left_out_rms_mm: 0.008,
+            alternating_px: Some(438.0),
+            published_choice_left_out_rms_mm: 0.019,
+        }
+    }
+
+    fn stage() -> StageExperiment {
+        let angle = |pose, error_deg| StageAngle {
+            pose,
+            placement: 0,
+            dial_deg: 10.0 * pose as f64,
+            error_deg,
+        };
+        StageExperiment {
+            methods: vec![MethodAngles {
+                method: "joint",
+                rms_deg: 0.015625,
+                wobble_rms_deg: vec![0.25, 0.5],
+                angles: vec![angle(0, 0.0078125), angle(1, -0.03125)],
+            }],
+        }
+    }
+
+    fn target() -> TargetExperiment {
+        let statistics = ErrorStatistics {
+            count: 300,
+            mean_mm: 0.011,
+            deviation_mm: 0.004,
+            variance_mm2: 0.004 * 0.004,
+            rms_mm: 0.0117,
+            worst_mm: 0.03,
+        };
+        let method = |method, errors: Option<ErrorStatistics>| TargetMethod {
+            method,
+            without_point: 2,
+            neighbor_rms_mm: errors.as_ref().map(|_| 0.006),
+            true_rms_mm: None,
+            largest_pose_deviation_mm: errors.as_ref().map(|_| 0.005),
+            errors,
+            poses: Vec::new(),
+        };
+        TargetExperiment {
+            markers: 320,
+            common: 300,
+            methods: vec![method("joint", Some(statistics)), method("baseline", None)],
+            cloud_method: Some("joint"),
+            cloud: Vec::new(),
+        }
+    }
+
+    fn known(frame_is_true: bool) -> KnownExperiment {
+        let errors = TruthErrors {
+            points: 190,
+            direct_rms_mm: 0.022,
+            placed_rms_mm: 0.021,
+            oracle_rms_mm: 0.02,
+            direct_ratio: 1.1,
+            placed_ratio: 1.05,
+        };
+        KnownExperiment {
+            matches: 200,
+            common: 190,
+            frame_is_true,
+            methods: vec![KnownMethod {
+                method: "joint",
+                without_point: 3,
+                errors: Some(errors),
+                bins: Vec::new(),
+            }],
+            oracle: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn every_part_in_words() {
+        let whole = Evaluation {
+            spread: Some(networks()),
+            stage_angles: Some(stage()),
+            target: Some(target()),
+            known_points: Some(known(true)),
+            ..empty("whole")
+        };
+        let mut falling = networks();
+        falling.published[1].left_out_rms_mm = 0.009;
+        let part = Evaluation {
+            methods: vec![MethodOutcome {
+                method: "alternating",
+                placed_poses: 0,
+                failed: Some("no view has the board's inner corners".to_owned()),
+            }],
+            spread: Some(falling),
+            known_points: Some(known(false)),
+            left_out: vec![LeftOut {
+                part: "measurement target",
+                reason: "the dataset has none".to_owned(),
+            }],
+            ..empty("part")
+        };
+        assert_snapshot("publication", &text(&[whole, part]));
+    }
+}

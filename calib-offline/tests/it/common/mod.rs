@@ -14,7 +14,10 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 pub mod against_truth;
+pub mod documented;
 pub mod halves;
+pub mod snapshot;
+pub mod standard;
 
 pub const BOARD: BoardSpec = BoardSpec {
     rows: 6,
