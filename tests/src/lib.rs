@@ -18,7 +18,8 @@ use calib_rays::geometry::SensorSize;
 use calib_rays::progress::Silent;
 use calib_recording::dataset::Dataset;
 use calib_simulate::{
-    MatchSet, OpticsKind, OutputSettings, Scene, SceneSettings, TrueMatch, write_dataset,
+    ImageFiles, MatchSet, OpticsKind, OutputSettings, Scene, SceneSettings, TrueMatch,
+    write_dataset,
 };
 use firmware_sim::client::DeviceClient;
 use firmware_sim::simulated::host::SimulatedDevice;
@@ -53,6 +54,7 @@ pub fn record(scene: &Scene, with_images: bool, folder: &Path) -> Dataset {
     let output = OutputSettings {
         corners: !with_images,
         images: with_images,
+        image_files: ImageFiles::Quick,
         point_count: 10,
         holdout_count: 10,
         ..OutputSettings::default()

@@ -1,9 +1,9 @@
 //! The images of a simulated dataset.
 
 use super::error::SimulateError;
-use super::render::{RenderSettings, Rendered};
+use super::render::Rendered;
 use super::scene::Scene;
-use super::settings::ImageDepth;
+use super::settings::{ImageDepth, ImageFiles, OutputSettings};
 use super::tables::{marker_table, match_table};
 use super::target;
 use super::writer::Writer;
@@ -13,8 +13,7 @@ use std::path::Path;
 /// The board at every pose in every camera; returns how many images.
 pub(super) fn write_board_images(
     scene: &Scene,
-    render: &RenderSettings,
-    depth: ImageDepth,
+    output: &OutputSettings,
     writer: &mut Writer,
 ) -> Result<usize, SimulateError> {
     for name in &scene.names {
@@ -25,9 +24,9 @@ pub(super) fn write_board_images(
         .collect();
     let folder = &writer.folder;
     let sizes = in_order::try_map(&views, |&(camera_idx, pose)| {
-        let image = scene.render_board(camera_idx, pose, render);
+        let image = scene.render_board(camera_idx, pose, &output.render);
         let name = format!("{}/{pose:04}.png", scene.names[camera_idx]);
-        write_png(&image, depth, &folder.join(name))
+        write_png(&image, output, &folder.join(name))
     })?;
     writer.byte_count += sizes.iter().sum::<u64>();
     Ok(views.len())
@@ -36,8 +35,7 @@ pub(super) fn write_board_images(
 /// The ring target at several distances: images, the true centers and their pixels.
 pub(super) fn write_target(
     scene: &Scene,
-    render: &RenderSettings,
-    depth: ImageDepth,
+    output: &OutputSettings,
     writer: &mut Writer,
 ) -> Result<(), SimulateError> {
     writer.subfolder("target")?;
@@ -52,9 +50,9 @@ pub(super) fn write_target(
     let sizes = in_order::try_map(&views, |&(camera_idx, pose)| {
         // Streams beyond those of the board's poses.
         let stream = scene.true_poses.len() + pose;
-        let image = scene.render_target(camera_idx, &poses[pose], render, stream);
+        let image = scene.render_target(camera_idx, &poses[pose], &output.render, stream);
         let name = format!("target/{}/{pose:04}.png", scene.names[camera_idx]);
-        write_png(&image, depth, &folder.join(name))
+        write_png(&image, output, &folder.join(name))
     })?;
     writer.byte_count += sizes.iter().sum::<u64>();
     let markers = target::seen_markers(scene, &poses);
@@ -71,14 +69,17 @@ pub(super) fn write_target(
 }
 
 /// Writes a PNG and returns its size.
-fn write_png(image: &Rendered, depth: ImageDepth, path: &Path) -> Result<u64, SimulateError> {
+fn write_png(image: &Rendered, output: &OutputSettings, path: &Path) -> Result<u64, SimulateError> {
     use image::codecs::png::{CompressionType, FilterType, PngEncoder};
     use image::{ExtendedColorType, ImageEncoder};
     let mut bytes = Vec::new();
-    let encoder =
-        PngEncoder::new_with_quality(&mut bytes, CompressionType::Best, FilterType::Adaptive);
+    let compression = match output.image_files {
+        ImageFiles::Small => CompressionType::Best,
+        ImageFiles::Quick => CompressionType::Fast,
+    };
+    let encoder = PngEncoder::new_with_quality(&mut bytes, compression, FilterType::Adaptive);
     let (width, height) = (image.sensor.width, image.sensor.height);
-    let result = match depth {
+    let result = match output.image_depth {
         ImageDepth::Eight => {
             encoder.write_image(&image.to_u8(), width, height, ExtendedColorType::L8)
         }

@@ -32,7 +32,7 @@ pub use output::{SimulateSummary, write_dataset};
 pub use preset::OpticsKind;
 pub use render::RenderSettings;
 pub use scene::Scene;
-pub use settings::{ImageDepth, OutputSettings, SceneError, SceneSettings};
+pub use settings::{ImageDepth, ImageFiles, OutputSettings, SceneError, SceneSettings};
 
 #[cfg(test)]
 mod output_tests;

@@ -171,10 +171,10 @@ fn write_files(
     }
     let mut image_count = 0;
     if settings.images {
-        image_count = write_board_images(scene, &settings.render, settings.image_depth, writer)?;
+        image_count = write_board_images(scene, settings, writer)?;
     }
     if settings.ring_target {
-        write_target(scene, &settings.render, settings.image_depth, writer)?;
+        write_target(scene, settings, writer)?;
     }
     let truth =
         serde_json::to_string(&truth(scene, settings)).map_err(|error| SimulateError::Io {

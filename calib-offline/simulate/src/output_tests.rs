@@ -158,6 +158,15 @@ fn the_same_seed_gives_the_same_bytes_images_included() {
         files(&folder)
     };
     let first = write("first", 3);
+    let quick = OutputSettings {
+        image_files: ImageFiles::Quick,
+        ..settings.clone()
+    };
+    let quick_folder = home.path().join("quick");
+    write_dataset(&scene(3), &quick, &quick_folder, false).unwrap();
+    let pixels = |bytes: &[u8]| image::load_from_memory(bytes).unwrap().into_bytes();
+    let place = "right/0003.png";
+    assert!(pixels(&files(&quick_folder)[place]) == pixels(&first[place]));
     assert!(
         !first.contains_key("corners.csv"),
         "the images are the data"
@@ -188,6 +197,7 @@ fn sixteen_bits_agree_with_eight() {
         let settings = OutputSettings {
             images: true,
             image_depth,
+            image_files: ImageFiles::Quick,
             ..few()
         };
         write_dataset(&scene(1), &settings, &folder, false).unwrap();

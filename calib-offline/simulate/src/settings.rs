@@ -187,6 +187,8 @@ pub struct OutputSettings {
     pub render: RenderSettings,
     /// 8 or 16 bits per pixel.
     pub image_depth: ImageDepth,
+    /// How they are compressed.
+    pub image_files: ImageFiles,
     /// How many matches inside the swept volume.
     pub point_count: usize,
     /// How many held-out corners.
@@ -201,10 +203,20 @@ impl Default for OutputSettings {
             ring_target: false,
             render: RenderSettings::default(),
             image_depth: ImageDepth::Eight,
+            image_files: ImageFiles::Small,
             point_count: 500,
             holdout_count: 500,
         }
     }
+}
+
+/// How images are compressed; the pixels are the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ImageFiles {
+    /// As well as can be.
+    Small,
+    /// In a fraction of the time.
+    Quick,
 }
 
 /// Bits per pixel.

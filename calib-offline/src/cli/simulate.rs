@@ -3,7 +3,7 @@
 use calib_rays::geometry::SensorSize;
 use calib_simulate::output::write_dataset;
 use calib_simulate::{
-    ImageDepth, OpticsKind, OutputSettings, RenderSettings, Scene, SceneSettings,
+    ImageDepth, ImageFiles, OpticsKind, OutputSettings, RenderSettings, Scene, SceneSettings,
 };
 pub use calib_simulate::{SimulateError, SimulateSummary};
 use clap::{Args, ValueEnum};
@@ -196,6 +196,7 @@ fn output_settings(args: &SimulateArgs) -> Result<OutputSettings, SimulateError>
         ring_target: args.target == Some(TargetKind::Ring),
         render,
         image_depth,
+        image_files: ImageFiles::Small,
         point_count: args.points,
         holdout_count: args.holdout,
     })

@@ -145,7 +145,7 @@ fn the_stage_is_found_where_it_stood() {
         }
     }
     let hand_held = {
-        let observations = observations(&scene, &scene.observe_corners());
+        let observations = observations(scene, &scene.observe_corners());
         let start = start_rig(&observations).unwrap();
         estimate(&start, &|_| None, &AlternatingSettings::default()).unwrap()
     };

@@ -14,14 +14,14 @@ fn board(pose: u32, u: u32, v: u32) -> u8 {
     if on_board && dark { 30 } else { 220 }
 }
 
-/// Four images per camera.
-fn dataset() -> tempfile::TempDir {
+/// So many images per camera.
+fn dataset(poses: u32) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mut manifest = MANIFEST.to_owned();
     for camera in ["left", "right"] {
         let place = folder.path().join("set").join(camera);
         fs::create_dir_all(&place).unwrap();
-        for pose in 0..4 {
+        for pose in 0..poses {
             let image = ImageBuffer::from_fn(640, 480, |u, v| Luma([board(pose, u, v)]));
             image.save(place.join(format!("{pose}.png"))).unwrap();
         }
@@ -59,7 +59,7 @@ fn claims_to_be(folder: &Path, width: u32, height: u32) -> Vec<u8> {
 
 #[test]
 fn a_file_that_is_no_image_of_its_camera() {
-    let folder = dataset();
+    let folder = dataset(2);
     let path = folder.path();
     let good = fs::read(path.join("set/left/1.png")).unwrap();
     let small = ImageBuffer::from_pixel(1, 1, Luma([9u8]));
@@ -82,13 +82,13 @@ fn a_file_that_is_no_image_of_its_camera() {
         fs::write(path.join("set/left/1.png"), bytes).unwrap();
         refused(path, 2, &["camera left, pose 1", words]);
     }
-    fs::write(path.join("set/right/3.png"), b"").unwrap();
+    fs::write(path.join("set/right/0.png"), b"").unwrap();
     refused(path, 2, &["camera left, pose 1", "1 more images"]);
 }
 
 #[test]
 fn images_without_the_board_that_is_described() {
-    let folder = dataset();
+    let folder = dataset(4);
     let path = folder.path();
     let set = path.join("set/dataset.toml");
     let manifest = fs::read_to_string(&set).unwrap();
@@ -121,7 +121,7 @@ fn images_without_the_board_that_is_described() {
 
 #[test]
 fn colors_and_sixteen_bits_are_read_like_gray() {
-    let folder = dataset();
+    let folder = dataset(4);
     let path = folder.path();
     let deep = ImageBuffer::from_fn(640, 480, |u, v| Luma([u16::from(board(1, u, v)) * 257]));
     deep.save(path.join("set/left/1.png")).unwrap();
@@ -136,7 +136,7 @@ fn colors_and_sixteen_bits_are_read_like_gray() {
 
 #[test]
 fn patterns_and_places_that_mean_nothing() {
-    let folder = dataset();
+    let folder = dataset(4);
     let path = folder.path();
     let set = path.join("set/dataset.toml");
     let manifest = fs::read_to_string(&set).unwrap();

@@ -10,7 +10,7 @@ use calib_offline::methods::METHODS;
 use calib_rays::board::BoardSpec;
 use calib_rays::progress::Silent;
 use calib_recording::dataset::Dataset;
-use calib_simulate::{OpticsKind, OutputSettings, Scene, SceneSettings, write_dataset};
+use calib_simulate::{ImageFiles, OpticsKind, OutputSettings, Scene, SceneSettings, write_dataset};
 use serde_json::json;
 use std::fs;
 use std::path::Path;
@@ -29,6 +29,7 @@ fn simulated(folder: &Path, ring_target: bool, change: impl FnOnce(&mut SceneSet
     change(&mut settings);
     let output = OutputSettings {
         ring_target,
+        image_files: ImageFiles::Quick,
         ..OutputSettings::default()
     };
     write_dataset(&Scene::new(settings).unwrap(), &output, folder, false).unwrap();

@@ -31,7 +31,7 @@ const SIMULATE: [&str; 16] = [
     "6",
     "--square-mm",
     "22",
-    "--angles=-39:13:39",
+    "--angles=-30:15:30",
     "--points=50",
     "--holdout=50",
 ];

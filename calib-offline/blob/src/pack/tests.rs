@@ -10,8 +10,8 @@ use nalgebra::{Vector2, Vector3};
 use ray_runtime::{OpenError, RayBlob};
 
 const SENSOR: SensorSize = SensorSize::new(1280, 1024);
-/// A quarter of the pixels, for what does not depend on their number.
-const SMALL: SensorSize = SensorSize::new(640, 512);
+/// A sixteenth of the pixels, for what does not depend on their number.
+const SMALL: SensorSize = SensorSize::new(320, 256);
 
 /// A camera on the x axis of the rig that looks at the origin from `distance_mm`.
 fn toed_in(x_mm: f64, distance_mm: f64) -> RigidTransform {
@@ -74,11 +74,11 @@ pub fn port_camera() -> CalibratedCamera {
     camera("port", field, toed_in(110.0, 600.0))
 }
 
-/// A camera without splines and its lens, on a sensor with half as many pixels along each side.
+/// A camera without splines and its lens, on a sensor with a quarter of the pixels along each side.
 fn on_small_sensor(mut camera: CalibratedCamera) -> CalibratedCamera {
     assert_eq!(camera.field.sensor, SENSOR);
     camera.field.sensor = SMALL;
-    camera.field.base.focal_px /= 2.0;
+    camera.field.base.focal_px /= 4.0;
     camera.coverage = CoverageMask::uniform(SMALL, true);
     camera
 }
@@ -258,8 +258,8 @@ fn a_bound_below_the_round_off_is_refused_with_the_best_figure() {
         panic!("{error}");
     };
     assert_eq!((camera.as_str(), wanted_px), ("left", 1e-6));
-    // The round-off of f32 at a focal length of 700 px: half of what it is at 1400.
-    assert!(best_px > 1.5e-5 && best_px < 1.5e-4, "{best_px}");
+    // The round-off of f32 at a focal length of 350 px: a quarter of what it is at 1400.
+    assert!(best_px > 7.5e-6 && best_px < 7.5e-5, "{best_px}");
 }
 
 #[test]

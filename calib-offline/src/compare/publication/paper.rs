@@ -6,7 +6,7 @@ use super::{Evaluation, ExperimentError, ExperimentSettings, evaluate};
 use calib_rays::progress::Progress;
 use calib_recording::dataset::Dataset;
 use calib_simulate::{
-    OpticsKind, OutputSettings, Scene, SceneSettings, SimulateError, write_dataset,
+    ImageFiles, OpticsKind, OutputSettings, Scene, SceneSettings, SimulateError, write_dataset,
 };
 
 /// Of all that is random.
@@ -61,6 +61,7 @@ pub fn evaluate_set_up(
             let written = scene.and_then(|scene| {
                 let output = OutputSettings {
                     ring_target: true,
+                    image_files: ImageFiles::Quick,
                     point_count: POINTS,
                     holdout_count: POINTS,
                     ..OutputSettings::default()

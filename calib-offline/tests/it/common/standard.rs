@@ -40,12 +40,13 @@ pub fn standard(optics: OpticsKind, seed: u64) -> &'static Standard {
     static MADE: Mutex<Vec<Made>> = Mutex::new(Vec::new());
     let place = {
         let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = made.iter().find(|(key, _)| *key == (optics, seed));
-        known.map(|(_, place)| *place).unwrap_or_else(|| {
+        if let Some((_, place)) = made.iter().find(|(key, _)| *key == (optics, seed)) {
+            place
+        } else {
             let place: &OnceLock<Standard> = Box::leak(Box::default());
             made.push(((optics, seed), place));
             place
-        })
+        }
     };
     place.get_or_init(|| {
         let scene = scene(optics, |settings| settings.seed = seed);
