@@ -26,12 +26,26 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let rig = estimate.rig(&["left".to_owned(), "right".to_owned()]);
     println!("{} views found wanting", findings.len());
 
-    // A point, mm, in the frame of the board at the first pose.
-    let corner = |view: &View| view.corners[0].pixel;
-    let (left, right) = (&views[0], views.iter().find(|view| view.camera_idx == 1));
-    let right = right.ok_or("the right camera sees no board")?;
-    let found = rig.triangulate(&[(0, corner(left)), (1, corner(right))])?;
-    println!("first corner of the first pose: {:.3?} mm", found.point_mm);
+    // The first corner that both cameras see in one pose, mm; the rig's frame is that of the board at the datum pose.
+    let seen_twice = views
+        .iter()
+        .filter(|view| view.camera_idx == 0)
+        .find_map(|left| {
+            let right = views
+                .iter()
+                .find(|view| view.camera_idx == 1 && view.pose == left.pose)?;
+            left.corners.iter().find_map(|a| {
+                let is_same = |b: &&Corner| (b.row, b.col) == (a.row, a.col);
+                let b = right.corners.iter().find(is_same)?;
+                Some((left.pose, *a, *b))
+            })
+        });
+    let (pose, left, right) = seen_twice.ok_or("no corner is seen by both cameras")?;
+    let found = rig.triangulate(&[(0, left.pixel), (1, right.pixel)])?;
+    println!(
+        "row {}, column {} of pose {pose}: {:.3?} mm, the rays {:.4} mm apart",
+        left.row, left.col, found.point_mm, found.gap_mm
+    );
     Ok(())
 }
 

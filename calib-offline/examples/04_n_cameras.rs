@@ -30,7 +30,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let names: Vec<String> = scene.names.iter().map(|name| (*name).to_owned()).collect();
     let rig = estimate(&start.observations, &start)?.rig(&names);
 
-    // A corner of pose 0 seen by all: the point nearest to all three rays.
+    // Row 7, column 6 of pose 8, where each camera sees it: the point nearest to all rays.
     let sightings: Vec<_> = (0..3)
         .filter_map(|camera_idx| Some((camera_idx, scene.true_corner(camera_idx, 8, 7, 6)?)))
         .collect();
