@@ -11,12 +11,16 @@ use calib_recording::dataset::Dataset;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-pub(crate) fn main() -> Result<(), Box<dyn Error>> {
-    let shipped = concat!(env!("CARGO_MANIFEST_DIR"), "/../data/opencv-stereo");
+fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args_os().nth(1).map(PathBuf::from);
-    // Under a test runner the argument is the runner's.
-    let folder = folder.filter(|folder| folder.is_dir());
-    let dataset = Dataset::load(folder.as_deref().unwrap_or(Path::new(shipped)))?;
+    run(folder.as_deref().unwrap_or(Path::new(SHIPPED)))
+}
+
+/// Thirteen real pairs.
+pub(crate) const SHIPPED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../data/opencv-stereo");
+
+pub(crate) fn run(folder: &Path) -> Result<(), Box<dyn Error>> {
+    let dataset = Dataset::load(folder)?;
 
     // Five folds by pose judge it: each board is measured by a calibration that never saw it.
     let calibration = calibrate(&dataset, &CalibrateSettings::default(), &Silent)?.calibration;

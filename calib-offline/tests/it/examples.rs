@@ -1,6 +1,7 @@
 //! The examples run to their end.
 
 use std::error::Error;
+use std::path::Path;
 
 type Example = fn() -> Result<(), Box<dyn Error>>;
 
@@ -8,6 +9,10 @@ type Example = fn() -> Result<(), Box<dyn Error>>;
 mod n_cameras;
 #[path = "../../examples/05_on_the_device.rs"]
 mod on_the_device;
+#[allow(
+    dead_code,
+    reason = "its main reads the arguments, which here are the test runner's"
+)]
 #[path = "../../examples/01_one_call.rs"]
 mod one_call;
 #[path = "../../examples/02_own_corners.rs"]
@@ -18,7 +23,7 @@ mod own_lens;
 #[test]
 fn every_example_runs() {
     let examples: [Example; 5] = [
-        one_call::main,
+        || one_call::run(Path::new(one_call::SHIPPED)),
         own_corners::main,
         own_lens::main,
         n_cameras::main,
