@@ -6,7 +6,7 @@
 #[allow(dead_code, reason = "other benches use the rest")]
 mod common;
 
-use calib_offline::evaluate::half_data::HalfData;
+use calib_judge::half_data::HalfData;
 use calib_simulate::{OpticsKind, Scene, SceneSettings};
 use common::halves::{halves_of, halves_of_one_camera};
 use common::{Arguments, Result, print_table};

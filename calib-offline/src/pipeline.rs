@@ -15,13 +15,13 @@ pub use corners::{Corners, corners};
 pub use error::{CalibrateError, NoSuchPose};
 pub use offered::{Offered, camera_names, explained, offered};
 
-use crate::evaluate::half_data::first_half;
-use crate::evaluate::held_out::folds_wanted;
-use crate::evaluate::verdict::Thresholds;
-use crate::evaluate::{Folds, held_out};
 use crate::methods::{Given, Joint, Method, Own, fit_folds};
 use crate::report::Calibration;
 use calib_estimate::adjust::Observations;
+use calib_judge::half_data::first_half;
+use calib_judge::held_out::folds_wanted;
+use calib_judge::verdict::Thresholds;
+use calib_judge::{Folds, held_out};
 use calib_rays::field::RayTable;
 use calib_rays::progress::Progress;
 use calib_recording::dataset::Dataset;

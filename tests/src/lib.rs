@@ -7,9 +7,9 @@
 )]
 
 use calib_blob::pack::{AlignedBytes, PackSettings, Packed, pack};
+use calib_judge::known_points::{PointWithTruth, TruthErrors, compare_with_truth};
 use calib_offline::demo::device::Pair;
 use calib_offline::device::on_wire;
-use calib_offline::evaluate::known_points::{PointWithTruth, TruthErrors, compare_with_truth};
 use calib_offline::pipeline::{CalibrateSettings, Checked, calibrate_corners, corners};
 use calib_offline::report::Calibration;
 use calib_offline::report::facts::Facts;

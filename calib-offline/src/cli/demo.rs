@@ -9,8 +9,6 @@ use crate::demo::device::{check_cortex_m, check_simulated, corner_pairs, known_p
 use crate::demo::page::{Entry, page};
 use crate::demo::unseen::measure_unseen;
 use crate::demo::{DemoError, DeviceCheck, Measured, words};
-use crate::evaluate::Folds;
-use crate::evaluate::known_points::KnownPoints;
 use crate::pipeline::{self, CalibrateSettings, Checked};
 use crate::report::facts::Facts;
 use crate::report::record::Grade;
@@ -18,6 +16,8 @@ use crate::report::{BlobFacts, text};
 use calib_blob::matches::{BlobSource, read_known};
 use calib_blob::pack::{AlignedBytes, BlobError};
 use calib_estimate::adjust::Observations;
+use calib_judge::Folds;
+use calib_judge::known_points::KnownPoints;
 use calib_rays::measure::PointSource;
 use calib_recording::atomic_file::{self, check_folder};
 use calib_recording::dataset::Dataset;

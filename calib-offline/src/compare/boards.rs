@@ -1,10 +1,10 @@
 //! Boards that no method saw, judged on the corners that every method can answer: a method that
 //! refuses the difficult part of the image would else look the better for it.
 
-use crate::evaluate::held_out::{BoardErrors, Fold, measure_boards};
 use calib_estimate::adjust::Observations;
 use calib_estimate::adjust::observations::{ObservedCorner, ViewBlock};
 use calib_estimate::init::board_pose::residuals_with_free_pose;
+use calib_judge::held_out::{BoardErrors, Fold, measure_boards};
 use calib_rays::field::Rig;
 use calib_rays::geometry::PixelPoint;
 use calib_rays::measure::RigSource;

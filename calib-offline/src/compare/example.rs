@@ -4,7 +4,7 @@ use super::bootstrap::Ratio;
 use super::record::{
     Comparison, HeldOutFigures, MethodFigures, Ratios, SCHEMA, Training, TruthFigures,
 };
-use crate::evaluate::known_points::TruthErrors;
+use calib_judge::known_points::TruthErrors;
 use std::time::Duration;
 
 fn method(method: &'static str, title: &'static str, factor: f64) -> MethodFigures {

@@ -17,10 +17,10 @@ pub mod words;
 pub use error::CompareError;
 pub use record::{Comparison, MethodFigures, SCHEMA};
 
-use crate::evaluate::held_out::folds_wanted;
 use crate::methods::{Joint, METHODS, Method, Screened};
 use crate::pipeline::{Corners, camera_names, explained, offered};
 use calib_blob::matches::read_known;
+use calib_judge::held_out::folds_wanted;
 use calib_rays::progress::Progress;
 use calib_recording::dataset::identity::input_sha256;
 use calib_recording::dataset::{Dataset, stage};

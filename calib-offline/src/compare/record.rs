@@ -1,8 +1,8 @@
 //! What a comparison found: `comparison.json`, and what `--json` prints.
 
 use super::bootstrap::Ratio;
-use crate::evaluate::held_out::FailedFold;
-use crate::evaluate::known_points::TruthErrors;
+use calib_judge::held_out::FailedFold;
+use calib_judge::known_points::TruthErrors;
 use serde::Serialize;
 use std::time::Duration;
 

@@ -2,8 +2,8 @@
 
 use super::answer::Answer;
 use super::record::MethodFigures;
-use crate::evaluate::Folds;
 use crate::methods::{Given, Method, MethodError, fit_folds};
+use calib_judge::Folds;
 use calib_rays::progress::{Progress, Silent};
 use std::time::{Duration, Instant};
 

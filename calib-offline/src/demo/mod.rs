@@ -7,8 +7,8 @@ pub mod page;
 pub mod unseen;
 pub mod words;
 
-use crate::evaluate::known_points::KnownPoints;
 use calib_blob::pack::PackError;
+use calib_judge::known_points::KnownPoints;
 use calib_rays::remedy::Remedy;
 use firmware_sim::client::ClientError;
 use ray_runtime::OpenError;

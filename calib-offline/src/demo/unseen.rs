@@ -1,11 +1,11 @@
 //! Boards that the calibration never saw, measured by the device's code through a blob.
 
 use super::DemoError;
-use crate::evaluate::Folds;
-use crate::evaluate::held_out::{BoardErrors, Fold, measure_boards};
 use calib_blob::matches::BlobSource;
 use calib_blob::pack::{AlignedBytes, PackSettings, pack_nearest};
 use calib_estimate::adjust::Observations;
+use calib_judge::Folds;
+use calib_judge::held_out::{BoardErrors, Fold, measure_boards};
 use calib_rays::in_order;
 use calib_rays::numerics::rms;
 use ray_runtime::RayBlob;

@@ -2,8 +2,8 @@
 
 use super::unseen::BoardFigures;
 use super::{DeviceCheck, Measured, UnseenBoards};
-use crate::evaluate::known_points::KnownPoints;
 use crate::present::numbers::short;
+use calib_judge::known_points::KnownPoints;
 
 /// Name and fact, one pair per line.
 pub fn lines(measured: &Measured) -> Vec<(String, String)> {
@@ -90,8 +90,8 @@ fn of_device(check: &DeviceCheck) -> String {
 mod tests {
     use super::*;
     use crate::demo::page::{Entry, page};
-    use crate::evaluate::known_points::TruthErrors;
     use crate::snapshot::{assert_snapshot, visible_text};
+    use calib_judge::known_points::TruthErrors;
 
     fn boards(pairs: usize, unmet: usize) -> BoardFigures {
         BoardFigures {

@@ -2,7 +2,6 @@
 
 use super::solution::{placed_part, positive, weighted};
 use super::{Given, Method, MethodError, Own, Solution};
-use crate::evaluate::held_out::Estimated;
 use crate::report::record::AlternatingRecord;
 use calib_estimate::adjust::Observations;
 use calib_estimate::alternating::alternation::{Alternated, AlternationStop};
@@ -12,6 +11,7 @@ use calib_estimate::alternating::{
 };
 use calib_estimate::init::rig::{RigStart, start_rig};
 use calib_estimate::reprojection::residuals;
+use calib_judge::held_out::Estimated;
 use calib_rays::board::BoardShape;
 use calib_rays::field::{BaseLens, MeasureError, RayTable, Rig};
 use calib_rays::geometry::{PixelPoint, Ray, SensorSize, triangulate_pair, triangulate_rays};

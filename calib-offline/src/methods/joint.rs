@@ -2,12 +2,12 @@
 
 use super::solution::{came_to_rest, positive};
 use super::{Given, Method, MethodError, Own, Solution};
-use crate::evaluate::held_out::Estimated;
-use crate::evaluate::{CrossChecks, cross_check};
 use crate::report::record::ChoicesRecord;
 use calib_estimate::adjust::Observations;
 use calib_estimate::init::rig::start_rig;
 use calib_estimate::joint::{Estimate, EstimateError, estimate, estimate_screened};
+use calib_judge::held_out::Estimated;
+use calib_judge::{CrossChecks, cross_check};
 use calib_rays::field::Rig;
 use calib_rays::progress::Progress;
 use std::collections::BTreeSet;

@@ -1,11 +1,11 @@
 //! What a method is: what it is given, and what it is asked for.
 
 use super::{MethodError, Solution};
-use crate::evaluate::held_out::Estimated;
-use crate::evaluate::{Folds, estimate_folds};
 use calib_estimate::adjust::Observations;
 use calib_estimate::init::screening::Finding;
 use calib_estimate::joint::Estimate;
+use calib_judge::held_out::Estimated;
+use calib_judge::{Folds, estimate_folds};
 use calib_rays::progress::Progress;
 use std::collections::BTreeMap;
 use std::fmt::Debug;

@@ -2,10 +2,10 @@
 
 use super::solution::{came_to_rest, placed_part, weighted};
 use super::{Given, Method, MethodError, Own, Solution};
-use crate::evaluate::held_out::Estimated;
 use calib_estimate::adjust::Observations;
 use calib_estimate::pinhole::{Loss, PinholeRig, RigSettings, Settings, calibrate_rig};
 use calib_estimate::reprojection::residuals;
+use calib_judge::held_out::Estimated;
 use calib_rays::board::BoardShape;
 use calib_rays::geometry::{PixelPoint, RigidTransform};
 use calib_rays::measure::{Point, PointSource, Sighting, Status};

@@ -1,11 +1,11 @@
 //! What a method found, whichever it was: all that the record, the report and a comparison need.
 
-use crate::evaluate::CrossChecks;
-use crate::evaluate::known_points::{Points, measure};
 use crate::report::record::{AlternatingRecord, ChoicesRecord};
 use calib_estimate::adjust::robust::{StudentT, relative_weights, reweight};
 use calib_estimate::adjust::{Observations, StopReason};
 use calib_estimate::init::screening::Finding;
+use calib_judge::CrossChecks;
+use calib_judge::known_points::{Points, measure};
 use calib_rays::board::BoardShape;
 use calib_rays::field::{RayTable, Rig};
 use calib_rays::geometry::{RigidTransform, SensorSize};

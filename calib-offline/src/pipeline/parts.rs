@@ -1,10 +1,10 @@
 //! What the steps found, for the record.
 
 use super::Corners;
-use crate::evaluate::verdict::Thresholds;
-use crate::evaluate::{CrossChecks, HeldOut};
 use crate::methods::Solution;
 use calib_estimate::adjust::Observations;
+use calib_judge::verdict::Thresholds;
+use calib_judge::{CrossChecks, HeldOut};
 use calib_recording::dataset::Dataset;
 
 /// Results of all steps.

@@ -2,13 +2,13 @@
 
 use super::left_out::{left_out, renumbered};
 use super::parts::Parts;
-use crate::evaluate::half_data::HalfDataCheck;
-use crate::evaluate::verdict::{Figures, judge};
-use crate::evaluate::{CrossChecks, HeldOut, fit_stage_axes};
 use crate::methods::solution::Solution;
 use crate::report::record::{
     Calibration, CornerRecord, EstimateRecord, HeldOutRecord, PoseRecord, SCHEMA, StageAxis,
 };
+use calib_judge::half_data::HalfDataCheck;
+use calib_judge::verdict::{Figures, judge};
+use calib_judge::{CrossChecks, HeldOut, fit_stage_axes};
 use calib_rays::numerics::rms;
 use calib_recording::dataset::identity::input_sha256;
 use calib_recording::dataset::stage;

@@ -2,10 +2,10 @@
 
 use super::record::{Calibration, ChoicesRecord};
 use super::words;
-use crate::evaluate::CrossChecks;
 use crate::present::numbers::short;
 use calib_estimate::joint::Family;
 use calib_estimate::joint::choice::NEEDED_GAIN;
+use calib_judge::CrossChecks;
 use maud::{Markup, html};
 
 /// The sections; nothing for a record of an earlier version.

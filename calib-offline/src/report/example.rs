@@ -4,12 +4,12 @@ use super::record::{
     BoardShape, Calibration, ChoicesRecord, CornerRecord, EstimateRecord, Grade, HeldOutRecord,
     LeftOut, PoseRecord, Renumbered, SCHEMA, Verdict,
 };
-use crate::evaluate::CrossChecks;
-use crate::evaluate::central_model::CentralModel;
-use crate::evaluate::centrality::Centrality;
-use crate::evaluate::half_data::{HalfData, HalfDataCheck};
-use crate::evaluate::working_volume::PointDifference;
 use calib_estimate::joint::{Alternative, Choice, Family, SmoothnessFound};
+use calib_judge::CrossChecks;
+use calib_judge::central_model::CentralModel;
+use calib_judge::centrality::Centrality;
+use calib_judge::half_data::{HalfData, HalfDataCheck};
+use calib_judge::working_volume::PointDifference;
 use calib_rays::board::BoardSpec;
 use calib_rays::field::uncertainty::packed;
 use calib_rays::field::{
@@ -93,7 +93,7 @@ pub fn calibration() -> Calibration {
             datum_pose: 8,
         },
         estimate: estimate(&corners),
-        stage_axes: crate::evaluate::fit_stage_axes(&boards, |pose| Some(pose / 17)),
+        stage_axes: calib_judge::fit_stage_axes(&boards, |pose| Some(pose / 17)),
         poses,
         corners,
         left_out: left_out(),

@@ -3,8 +3,8 @@
 
 use super::record::{Calibration, Grade};
 use super::words;
-use crate::evaluate::central_model::CentralModel;
-use crate::evaluate::half_data::HalfDataCheck;
+use calib_judge::central_model::CentralModel;
+use calib_judge::half_data::HalfDataCheck;
 use serde::Serialize;
 use std::collections::BTreeSet;
 
@@ -178,17 +178,6 @@ fn working_distance(calibration: &Calibration, views: &BTreeSet<(usize, usize)>)
         median: *distances.get(distances.len() / 2)?,
         most: *distances.last()?,
     })
-}
-
-impl Grade {
-    /// The grade as a word.
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Pass => "pass",
-            Self::Doubtful => "doubtful",
-            Self::Fail => "fail",
-        }
-    }
 }
 
 #[cfg(test)]

@@ -11,8 +11,8 @@ use super::plot::{
 use super::procedure;
 use super::record::{Calibration, HeldOutRecord};
 use super::words;
-use crate::evaluate::half_data::HalfDataCheck;
 use crate::present::numbers::short;
+use calib_judge::half_data::HalfDataCheck;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// The page as a file's content.

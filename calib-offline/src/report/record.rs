@@ -1,12 +1,12 @@
 //! `calibration.json`: everything a calibration found, versioned, enough to draw every figure again.
 
-pub use crate::evaluate::CrossChecks;
-pub use crate::evaluate::held_out::FailedFold;
-pub use crate::evaluate::stage_axis::StageAxis;
-pub use crate::evaluate::verdict::{Grade, Verdict};
 use calib_estimate::alternating::estimate::{PlacementCircles, StartCost};
 use calib_estimate::alternating::spread::SpreadChoice;
 use calib_estimate::joint::{Choice, SmoothnessFound};
+pub use calib_judge::CrossChecks;
+pub use calib_judge::held_out::FailedFold;
+pub use calib_judge::stage_axis::StageAxis;
+pub use calib_judge::verdict::{Grade, Verdict};
 pub use calib_rays::board::BoardShape;
 use calib_rays::board::BoardSpec;
 use calib_rays::field::Rig;

@@ -1,11 +1,11 @@
 //! Choices and checks of the record in plain words, for the terminal and the page alike.
 
 use super::record::{Calibration, ChoicesRecord};
-use crate::evaluate::central_model::CentralModel;
-use crate::evaluate::centrality::Centrality;
-use crate::evaluate::half_data::{HalfData, HalfDataCheck, Skipped};
 use crate::present::numbers::short;
 use calib_estimate::joint::{Alternative, Choice, Family};
+use calib_judge::central_model::CentralModel;
+use calib_judge::centrality::Centrality;
+use calib_judge::half_data::{HalfData, HalfDataCheck, Skipped};
 use calib_rays::field::structured::OFFSET_CORE_DEGREE;
 
 /// How many numbers of a kind there are, and how many of them the data determine.

@@ -9,7 +9,7 @@ use calib_estimate::alternating::{
     AlternatingError, AlternatingEstimate, AlternatingSettings, estimate,
 };
 use calib_estimate::init::rig::start_rig;
-use calib_offline::evaluate::known_points::TruthErrors;
+use calib_judge::known_points::TruthErrors;
 use calib_offline::methods::alternating::SingleRays;
 use calib_offline::methods::{Alternating, Given, Method as _};
 use calib_rays::geometry::RigidTransform;

@@ -4,10 +4,10 @@
 use crate::common::against_truth::{run_scene, run_views, scene};
 use crate::common::halves::{checked, halves_of_one_camera, names};
 use crate::common::standard::standard;
-use calib_offline::evaluate::central_model::CentralModel;
-use calib_offline::evaluate::cross_check;
-use calib_offline::evaluate::half_data::{HalfDataCheck, Skipped};
-use calib_offline::evaluate::working_volume::{Match, compare, matches_at, span};
+use calib_judge::central_model::CentralModel;
+use calib_judge::cross_check;
+use calib_judge::half_data::{HalfDataCheck, Skipped};
+use calib_judge::working_volume::{Match, compare, matches_at, span};
 use calib_rays::field::Rig;
 use calib_rays::geometry::best_placement;
 use calib_rays::geometry::{Ray, nearest_point, triangulate_pair};

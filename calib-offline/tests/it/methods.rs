@@ -3,8 +3,8 @@
 use crate::common::documented::assert_documented;
 use crate::common::{MANIFEST, contents, corners_csv, dataset, run};
 use calib_estimate::adjust::Observations;
+use calib_judge::held_out::Estimated;
 use calib_offline::compare::{compare_methods, words};
-use calib_offline::evaluate::held_out::Estimated;
 use calib_offline::methods::{Given, Joint, Method, MethodError, Pinhole, Solution};
 use calib_offline::pipeline;
 use calib_rays::progress::{Progress, Silent};

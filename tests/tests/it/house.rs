@@ -7,9 +7,8 @@ use std::path::{Path, PathBuf};
 
 /// The rooms of the program from the bottom up; a room may import those of its own floor and of floors before it.
 /// ARCHITECTURE.md draws them.
-const FLOORS: [&[&str]; 6] = [
+const FLOORS: [&[&str]; 5] = [
     &["present"],
-    &["evaluate"],
     &["device", "report"],
     &["methods"],
     &["pipeline", "compare", "demo"],

@@ -3,12 +3,12 @@
 use super::ExperimentError;
 use super::runs::{MethodRun, measure_all};
 use super::target::middle;
-use crate::evaluate::known_points::TruthErrors;
-use crate::evaluate::known_points::beside_truth;
-use crate::evaluate::known_points::compare_with_truth;
 use crate::pipeline::camera_names;
 use calib_blob::matches::TruePoint;
 use calib_blob::matches::read_known;
+use calib_judge::known_points::TruthErrors;
+use calib_judge::known_points::beside_truth;
+use calib_judge::known_points::compare_with_truth;
 use calib_rays::geometry::best_placement;
 use calib_rays::measure::Sighting;
 use calib_rays::numerics::rms;

@@ -1,7 +1,7 @@
 //! All methods on the same corners, brought to one frame, and what they measure there.
 
-use crate::evaluate::known_points::Points;
 use crate::methods::{Given, METHODS, MethodError, Solution};
+use calib_judge::known_points::Points;
 use calib_rays::geometry::RigidTransform;
 use calib_rays::measure::Sighting;
 use calib_rays::progress::Silent;

@@ -1,7 +1,7 @@
 //! Angle of each pose about the stage's axis against the dial (publication, Fig. 8).
 
 use super::runs::{InDatum, MethodRun, solved};
-use crate::evaluate::fit_stage_axes;
+use calib_judge::fit_stage_axes;
 use calib_rays::geometry::RigidTransform;
 use calib_rays::geometry::so3;
 use calib_rays::numerics::rms;

@@ -4,7 +4,7 @@
 use super::ExperimentError;
 use super::runs::{InDatum, MethodRun, measure_all};
 use super::statistics::ErrorStatistics;
-use crate::evaluate::measured_board::MeasuredBoard;
+use calib_judge::measured_board::MeasuredBoard;
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::best_placement;
 use calib_rays::measure::Sighting;

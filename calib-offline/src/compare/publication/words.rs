@@ -6,10 +6,10 @@ use super::spread::SpreadExperiment;
 use super::stage::StageExperiment;
 use super::statistics::ErrorStatistics;
 use super::target::{TargetExperiment, TargetMethod};
-use crate::evaluate::known_points::TruthErrors;
 use crate::methods::METHODS;
 use crate::present::numbers::{or_dash, short};
 use crate::present::table::Table;
+use calib_judge::known_points::TruthErrors;
 use std::fmt::Write as _;
 
 /// The publication's mean error of its method, mm.
@@ -255,8 +255,8 @@ mod tests {
     use super::super::statistics::ErrorStatistics;
     use super::super::{LeftOut, MethodOutcome, known::KnownMethod};
     use super::*;
-    use crate::evaluate::known_points::TruthErrors;
     use crate::snapshot::assert_snapshot;
+    use calib_judge::known_points::TruthErrors;
 
     fn empty(name: &str) -> Evaluation {
         Evaluation {

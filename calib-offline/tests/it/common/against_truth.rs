@@ -4,7 +4,7 @@ use calib_estimate::adjust::Observations;
 use calib_estimate::init::rig::start_rig;
 use calib_estimate::init::screening::{Finding, FindingKind};
 use calib_estimate::joint::{Estimate, estimate_screened};
-use calib_offline::evaluate::known_points::{PointWithTruth, TruthErrors, compare_with_truth};
+use calib_judge::known_points::{PointWithTruth, TruthErrors, compare_with_truth};
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::{PixelPoint, RigidTransform, best_placement, so3};
 use calib_rays::measure::{PointSource, RigSource};

@@ -2,8 +2,8 @@
 
 use super::against_truth::run_views;
 use calib_estimate::joint::Estimate;
-use calib_offline::evaluate::half_data::{HalfData, HalfDataCheck, first_half};
-use calib_offline::evaluate::{CrossChecks, cross_check};
+use calib_judge::half_data::{HalfData, HalfDataCheck, first_half};
+use calib_judge::{CrossChecks, cross_check};
 use calib_rays::observed::View;
 use calib_simulate::{OpticsKind, Scene, SceneSettings};
 

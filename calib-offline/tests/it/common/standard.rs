@@ -4,8 +4,8 @@ use super::against_truth::{run_scene, scene};
 use super::halves::checked;
 use calib_estimate::init::screening::Finding;
 use calib_estimate::joint::Estimate;
-use calib_offline::evaluate::CrossChecks;
-use calib_offline::evaluate::half_data::{HalfData, HalfDataCheck};
+use calib_judge::CrossChecks;
+use calib_judge::half_data::{HalfData, HalfDataCheck};
 use calib_simulate::{OpticsKind, Scene};
 use std::sync::{Mutex, OnceLock, PoisonError};
 

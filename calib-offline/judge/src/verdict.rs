@@ -23,13 +23,20 @@ pub enum Grade {
     Fail,
 }
 
-impl std::fmt::Display for Grade {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
+impl Grade {
+    /// The grade as a word.
+    pub const fn word(self) -> &'static str {
+        match self {
             Self::Pass => "pass",
             Self::Doubtful => "doubtful",
             Self::Fail => "fail",
-        })
+        }
+    }
+}
+
+impl std::fmt::Display for Grade {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.word())
     }
 }
 

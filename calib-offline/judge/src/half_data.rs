@@ -41,7 +41,6 @@ pub enum HalfDataCheck {
 /// Why the halves were not compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
 pub enum Skipped {
     /// Nobody asked for it.
     NotWanted,
