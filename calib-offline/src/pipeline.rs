@@ -159,6 +159,8 @@ pub fn calibrate_corners(
         || solution.own.check(&solution.rig, half),
     );
     progress.end();
+    let mut causes = Vec::new();
+    calib_judge::cause::sort(&mut causes);
     let calibration = summary::record(&Parts {
         dataset,
         corners,
@@ -166,6 +168,7 @@ pub fn calibrate_corners(
         solution: &solution,
         held_out: &held_out(&folds),
         checks: checks.as_ref(),
+        causes: &causes,
         thresholds: &settings.thresholds,
     });
     Ok(Checked {

@@ -1,6 +1,7 @@
 //! Judging: what a recording covers before a calibration, and what the calibration is worth after
 //! it, on boards that it never saw, in millimeters and in pixels.
 
+pub mod cause;
 pub mod central_model;
 pub mod centrality;
 pub mod cross_checks;
@@ -13,6 +14,7 @@ pub mod stage_axis;
 pub mod verdict;
 pub mod working_volume;
 
+pub use cause::{Cause, Code};
 pub use cross_checks::{CrossChecks, cross_check};
 pub use held_out::{Folds, HeldOut, estimate_folds, held_out};
 pub use stage_axis::fit_stage_axes;

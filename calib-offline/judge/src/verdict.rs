@@ -1,5 +1,6 @@
 //! Pass, doubtful or fail, with reasons: every figure next to its threshold.
 
+use super::cause::Cause;
 use serde::{Deserialize, Serialize};
 
 /// The judgement with its reasons.
@@ -78,6 +79,22 @@ impl Default for Thresholds {
             poses: (10, 3),
             covered_share: 0.5,
         }
+    }
+}
+
+impl Verdict {
+    /// The verdict with what was found about the recording: causes that lower a grade are reasons.
+    pub fn with_causes(mut self, causes: &[Cause]) -> Self {
+        let lowering = |cause: &&Cause| cause.grade > Grade::Pass;
+        let reasons: Vec<String> = causes
+            .iter()
+            .filter(lowering)
+            .map(|cause| format!("{}: {}", cause.grade, cause.text))
+            .collect();
+        let worst = causes.iter().map(|cause| cause.grade).max();
+        self.grade = self.grade.max(worst.unwrap_or(Grade::Pass));
+        self.reasons.splice(0..0, reasons);
+        self
     }
 }
 

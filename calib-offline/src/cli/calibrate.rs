@@ -33,6 +33,9 @@ rig's frame; NaN where there is no ray. Those of --method alternating are its ow
 
 With --json, schema calib-offline/calibrate/1; a figure that does not apply is null:
   verdict, reasons
+  causes (cause, since_pose, size, cost_mm, text, grade)
+                                 what was found about the recording, most likely first; cost_mm: RMS error
+                                 that it leaves in points; grade: the best verdict that it allows
   held_out_neighbor_percent, held_out_neighbor_mm, held_out_rigid_mm, held_out_rms_px
   half_data_mm, half_data_ratio  points of two calibrations from half of the poses: RMS difference,
                                  and over what was predicted

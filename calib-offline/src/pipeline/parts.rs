@@ -4,7 +4,7 @@ use super::Corners;
 use crate::methods::Solution;
 use calib_estimate::adjust::Observations;
 use calib_judge::verdict::Thresholds;
-use calib_judge::{CrossChecks, HeldOut};
+use calib_judge::{Cause, CrossChecks, HeldOut};
 use calib_recording::dataset::Dataset;
 
 /// Results of all steps.
@@ -21,6 +21,8 @@ pub struct Parts<'a> {
     pub held_out: &'a HeldOut,
     /// Checks of the calibration against itself, where the method has them.
     pub checks: Option<&'a CrossChecks>,
+    /// What was found about the recording, most likely first.
+    pub causes: &'a [Cause],
     /// What counts as good.
     pub thresholds: &'a Thresholds,
 }

@@ -46,7 +46,8 @@ pub fn record(parts: &Parts) -> Calibration {
             settled: solution.settled,
         },
         parts.thresholds,
-    );
+    )
+    .with_causes(parts.causes);
     Calibration {
         schema: SCHEMA.to_string(),
         tool_version: env!("CARGO_PKG_VERSION").to_string(),
@@ -65,6 +66,7 @@ pub fn record(parts: &Parts) -> Calibration {
         alternating: solution.alternating.clone(),
         held_out,
         checks: parts.checks.cloned(),
+        causes: parts.causes.to_vec(),
         verdict,
     }
 }

@@ -106,6 +106,7 @@ pub fn calibration() -> Calibration {
         }],
         choices: Some(choices()),
         checks: Some(checks()),
+        causes: Vec::new(),
         alternating: None,
         held_out: Some(held_out()),
         verdict: Verdict {

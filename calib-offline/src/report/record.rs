@@ -3,10 +3,10 @@
 use calib_estimate::alternating::estimate::{PlacementCircles, StartCost};
 use calib_estimate::alternating::spread::SpreadChoice;
 use calib_estimate::joint::{Choice, SmoothnessFound};
-pub use calib_judge::CrossChecks;
 pub use calib_judge::held_out::FailedFold;
 pub use calib_judge::stage_axis::StageAxis;
 pub use calib_judge::verdict::{Grade, Verdict};
+pub use calib_judge::{Cause, CrossChecks};
 pub use calib_rays::board::BoardShape;
 use calib_rays::board::BoardSpec;
 use calib_rays::field::Rig;
@@ -64,6 +64,9 @@ pub struct Calibration {
     /// Checks of the calibration against itself; `None` in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub checks: Option<CrossChecks>,
+    /// What was found about the recording, most likely first.
+    #[serde(default)]
+    pub causes: Vec<Cause>,
     /// The judgement.
     pub verdict: Verdict,
 }

@@ -188,6 +188,7 @@ pub fn calibration() -> Calibration {
         alternating: None,
         held_out: None,
         checks: None,
+        causes: Vec::new(),
         verdict: Verdict {
             grade: Grade::Pass,
             reasons: Vec::new(),
