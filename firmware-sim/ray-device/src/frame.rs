@@ -11,7 +11,7 @@
 //! other. Delimiters with nothing between them are skipped in silence, so a sender may begin with
 //! one to cut off what an earlier peer left unfinished.
 
-use crc::{CRC_32_ISO_HDLC, Crc};
+use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use serde::{Serialize, de::DeserializeOwned};
 
 use crate::cobs;
@@ -31,7 +31,9 @@ pub const NO_SEQUENCE: u16 = 0;
 
 const HEAD_LENGTH: usize = 3;
 const CHECKSUM_LENGTH: usize = 4;
-static CHECKSUM: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+/// One 1 KiB table on a device; sixteen, which take sixteen bytes at a time, where there is memory.
+type Tables = Table<{ if cfg!(target_os = "none") { 1 } else { 16 } }>;
+static CHECKSUM: Crc<u32, Tables> = Crc::<u32, Tables>::new(&CRC_32_ISO_HDLC);
 
 /// CRC-32/ISO-HDLC (zlib's) of `bytes`: of frames, of blobs under way, of commit records.
 pub fn checksum(bytes: &[u8]) -> u32 {
@@ -39,7 +41,7 @@ pub fn checksum(bytes: &[u8]) -> u32 {
 }
 
 /// The same, piece by piece.
-pub struct RunningChecksum(crc::Digest<'static, u32>);
+pub struct RunningChecksum(crc::Digest<'static, u32, Tables>);
 
 impl Default for RunningChecksum {
     /// Of no bytes yet.
