@@ -11,7 +11,7 @@ use crate::device::{DeviceSource, connect};
 use crate::present::numbers::short;
 use calib_blob::matches::{
     BlobSource, MatchesError, MeasureSummary, POINTS_HEADER, StreamError, measure_batches,
-    measure_stream,
+    measure_with_blob, measure_with_calibration,
 };
 use calib_rays::measure::{PointSource, RigSource};
 use calib_recording::atomic_file::{PendingFile, WriteError};
@@ -19,7 +19,7 @@ use clap::Args;
 use firmware_sim::client::DEFAULT_TIMEOUT;
 use serde::Serialize;
 use std::fs::File;
-use std::io::Read;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 const EXAMPLE: &str = "\
@@ -132,12 +132,14 @@ fn measure_here(args: &MeasureArgs, rig: &Path) -> Result<(&'static str, Measure
             let blob = open(&bytes, rig)?;
             let names = names(BlobSource::new(&blob, None));
             let source = BlobSource::new(&blob, frame);
-            ("blob", measure(args, rig, source.as_ref(), names)?)
+            let measured = measure(args, rig, source.as_ref(), names, measure_with_blob)?;
+            ("blob", measured)
         }
         RigFile::Calibration(calibration) => {
             let names = names(RigSource::new(&calibration.rig, None));
             let source = RigSource::new(&calibration.rig, frame);
-            ("calibration", measure(args, rig, source.as_ref(), names)?)
+            let measured = measure(args, rig, source.as_ref(), names, measure_with_calibration)?;
+            ("calibration", measured)
         }
     })
 }
@@ -147,11 +149,17 @@ fn names(source: Option<impl PointSource>) -> Vec<String> {
 }
 
 /// `source` is none where the frame is none of the cameras `known`.
-fn measure<S: PointSource>(
+fn measure<S>(
     args: &MeasureArgs,
     rig: &Path,
     source: Option<&S>,
     known: Vec<String>,
+    measure: impl FnOnce(
+        &S,
+        &Path,
+        &mut dyn Read,
+        &mut dyn Write,
+    ) -> Result<MeasureSummary, StreamError>,
 ) -> Result<MeasureSummary, Error> {
     if known.len() < 2 {
         return Err(Error::Usage(UsageError::OneCamera {
@@ -165,7 +173,7 @@ fn measure<S: PointSource>(
         }));
     };
     stream(args, |file, input, output| {
-        measure_stream(source, file, input, output)
+        measure(source, file, input, output)
     })
 }
 

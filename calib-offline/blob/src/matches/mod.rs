@@ -18,4 +18,6 @@ pub use header::Columns;
 pub use known::{KnownMatches, TruePoint, read_known};
 pub use list::read_matches;
 pub use row::POINTS_HEADER;
-pub use stream::{MeasureSummary, StreamError, measure_batches, measure_stream};
+pub use stream::{
+    MeasureSummary, StreamError, measure_batches, measure_with_blob, measure_with_calibration,
+};

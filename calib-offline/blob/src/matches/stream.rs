@@ -1,10 +1,11 @@
 //! A whole file of matches in blocks: read in order, computed in parallel or asked for elsewhere,
 //! written in order.
 
+use super::blob_source::BlobSource;
 use super::error::{MatchesError, RowProblem, shortened};
 use super::header::Columns;
 use super::row::{self, POINTS_HEADER};
-use calib_rays::measure::{BatchSource, Number, Point, PointSource, Sighting, Status};
+use calib_rays::measure::{BatchSource, Number, Point, PointSource, RigSource, Sighting, Status};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::convert::Infallible;
@@ -51,12 +52,36 @@ impl<E> From<MatchesError> for StreamError<E> {
     }
 }
 
-/// Measures every match of `input` and writes one row per match to `output`. `file` is for
-/// messages only.
+/// Measures every match of `input` with a blob and writes one row per match to `output`. `file` is
+/// for messages only.
+///
+/// Not generic, like [`measure_with_calibration`]: it is compiled as this crate is, not as its caller.
 ///
 /// # Errors
 /// [`StreamError`]; what was written until then is to be thrown away.
-pub fn measure_stream<S: PointSource>(
+pub fn measure_with_blob(
+    source: &BlobSource<'_>,
+    file: &Path,
+    mut input: &mut dyn Read,
+    mut output: &mut dyn Write,
+) -> Result<MeasureSummary, StreamError> {
+    measure_stream(source, file, &mut input, &mut output)
+}
+
+/// The same with a calibration, in double precision.
+///
+/// # Errors
+/// [`StreamError`]; what was written until then is to be thrown away.
+pub fn measure_with_calibration(
+    source: &RigSource<'_>,
+    file: &Path,
+    mut input: &mut dyn Read,
+    mut output: &mut dyn Write,
+) -> Result<MeasureSummary, StreamError> {
+    measure_stream(source, file, &mut input, &mut output)
+}
+
+fn measure_stream<S: PointSource>(
     source: &S,
     file: &Path,
     input: &mut impl Read,
