@@ -59,7 +59,7 @@ pub(super) fn write_target(
     writer.text(
         "target/matches.csv",
         &match_table(
-            scene,
+            &scene.names,
             markers
                 .iter()
                 .map(|marker| (marker.id, &marker.true_pixels[..])),

@@ -9,6 +9,7 @@
 //! else: a mistake in the ray field cannot hide in both.
 
 mod error;
+pub mod faults;
 mod images;
 pub mod matches;
 mod observe;

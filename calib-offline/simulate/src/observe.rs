@@ -15,7 +15,11 @@ impl Scene {
         let mut views = Vec::new();
         for camera_idx in 0..self.cameras.len() {
             for pose in 0..self.true_poses.len() {
-                let corners = self.observe_view(camera_idx, pose);
+                let left_from_board = self.exposed_pose(camera_idx, pose);
+                let corners = self.observe_view(camera_idx, pose, |row, col| {
+                    let corner = self.corner_in_board(row, col);
+                    self.project_board_point(camera_idx, &left_from_board, &corner)
+                });
                 if !corners.is_empty() {
                     views.push(View {
                         camera_idx,
@@ -28,14 +32,19 @@ impl Scene {
         views
     }
 
-    fn observe_view(&self, camera_idx: usize, pose: usize) -> Vec<Corner> {
+    /// The corners of a view whose clean pixels are given, with the scene's noise and mistakes.
+    pub(super) fn observe_view(
+        &self,
+        camera_idx: usize,
+        pose: usize,
+        clean: impl Fn(usize, usize) -> Option<PixelPoint>,
+    ) -> Vec<Corner> {
         let settings = &self.settings;
         let board = &settings.board;
         let noise = self.noise_px(camera_idx, pose);
         let mut missing_rng = random::stream(settings.seed, Purpose::Missing, camera_idx, pose);
         let mut outlier_rng = random::stream(settings.seed, Purpose::Outliers, camera_idx, pose);
         let sensor = self.cameras[camera_idx].sensor();
-        let left_from_board = self.exposed_pose(camera_idx, pose);
         let is_flipped = settings.flipped_views.contains(&(camera_idx, pose));
         let mut corners = Vec::new();
         for row in 0..board.rows {
@@ -45,9 +54,7 @@ impl Scene {
                 let is_outlier = random::uniform(&mut outlier_rng) < settings.outlier_share;
                 let outlier_px = random::between(&mut outlier_rng, 3.0, 10.0);
                 let outlier_angle = random::between(&mut outlier_rng, 0.0, std::f64::consts::TAU);
-                let corner = self.corner_in_board(row, col);
-                let Some(clean) = self.project_board_point(camera_idx, &left_from_board, &corner)
-                else {
+                let Some(clean) = clean(row, col) else {
                     continue;
                 };
                 let [du, dv] = noise[row * board.cols + col];

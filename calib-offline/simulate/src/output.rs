@@ -140,7 +140,7 @@ fn write_files(
     if settings.corners {
         let views = scene.observe_corners();
         corner_count = views.iter().map(|view| view.corners.len()).sum();
-        writer.text("corners.csv", &corner_table(scene, &views))?;
+        writer.text("corners.csv", &corner_table(&scene.names, &views))?;
     }
     let mut oracle_rms = [0.0; 2];
     let mut counts = [0; 2];
@@ -161,7 +161,7 @@ fn write_files(
         writer.text(
             &format!("{name}.csv"),
             &match_table(
-                scene,
+                &scene.names,
                 matches.iter().map(|entry| (entry.id, &entry.pixels[..])),
             ),
         )?;

@@ -99,14 +99,14 @@ impl RigPreset {
 }
 
 /// Geometry that kinds differ in.
-struct Layout {
-    baseline_mm: f64,
-    distance_mm: f64,
+pub(super) struct Layout {
+    pub baseline_mm: f64,
+    pub distance_mm: f64,
     /// Where the axes cross, mm before the bench; infinite for parallel axes.
-    toe_in_mm: f64,
-    radius_mm: f64,
-    spread_shift_mm: [f64; 2],
-    spread_look_deg: [f64; 2],
+    pub toe_in_mm: f64,
+    pub radius_mm: f64,
+    pub spread_shift_mm: [f64; 2],
+    pub spread_look_deg: [f64; 2],
 }
 
 const NARROW: Layout = Layout {
@@ -126,7 +126,6 @@ const BROWN: [[f64; 5]; 2] = [
 ];
 
 pub(super) fn rig(kind: OpticsKind, sensor: SensorSize) -> RigPreset {
-    let layout = layout(kind);
     let sensors = match kind {
         OpticsKind::Unequal => [
             sensor,
@@ -141,34 +140,41 @@ pub(super) fn rig(kind: OpticsKind, sensor: SensorSize) -> RigPreset {
         let (lens, media) = camera(kind, idx, sensors[idx]);
         CameraOptics::new(sensors[idx], lens, media)
     });
-    let bench_from_camera = [-1.0, 1.0].map(|side: f64| {
-        let toe_in_rad = (layout.baseline_mm / 2.0 / layout.toe_in_mm).atan();
-        // A mechanical rig is never square: small turns and offsets, mirrored by no symmetry.
-        let crooked = Vector3::new(0.006 - 0.009 * side, 0.0, 0.011 * side + 0.004);
-        let step_mm = if kind == OpticsKind::Unequal {
-            60.0
-        } else {
-            0.0
-        };
-        RigidTransform::new(
-            so3::exp(&Vector3::new(0.0, -side * toe_in_rad, 0.0)) * so3::exp(&crooked),
-            Vector3::new(
-                side * layout.baseline_mm / 2.0,
-                1.5 * side,
-                2.0 * side + step_mm * (side + 1.0) / 2.0,
-            ),
-        )
-    });
-    RigPreset {
-        cameras,
-        bench_from_camera,
-        mount: Mount {
-            radius_mm: layout.radius_mm,
-            tilt_deg: [4.0, -2.0, 1.5],
-        },
-        distance_mm: layout.distance_mm,
-        spread_shift_mm: layout.spread_shift_mm,
-        spread_look_deg: layout.spread_look_deg,
+    let step_mm = if kind == OpticsKind::Unequal {
+        60.0
+    } else {
+        0.0
+    };
+    layout(kind).rig(cameras, step_mm)
+}
+
+impl Layout {
+    /// Puts two cameras on the bench, the right one `step_mm` nearer to the scene.
+    pub fn rig(&self, cameras: [CameraOptics; 2], step_mm: f64) -> RigPreset {
+        let bench_from_camera = [-1.0, 1.0].map(|side: f64| {
+            let toe_in_rad = (self.baseline_mm / 2.0 / self.toe_in_mm).atan();
+            // A mechanical rig is never square: small turns and offsets, mirrored by no symmetry.
+            let crooked = Vector3::new(0.006 - 0.009 * side, 0.0, 0.011 * side + 0.004);
+            RigidTransform::new(
+                so3::exp(&Vector3::new(0.0, -side * toe_in_rad, 0.0)) * so3::exp(&crooked),
+                Vector3::new(
+                    side * self.baseline_mm / 2.0,
+                    1.5 * side,
+                    2.0 * side + step_mm * (side + 1.0) / 2.0,
+                ),
+            )
+        });
+        RigPreset {
+            cameras,
+            bench_from_camera,
+            mount: Mount {
+                radius_mm: self.radius_mm,
+                tilt_deg: [4.0, -2.0, 1.5],
+            },
+            distance_mm: self.distance_mm,
+            spread_shift_mm: self.spread_shift_mm,
+            spread_look_deg: self.spread_look_deg,
+        }
     }
 }
 

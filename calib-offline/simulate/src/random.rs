@@ -27,6 +27,10 @@ pub(super) enum Purpose {
     NoiseTail = 10,
     /// Placements beyond the listed ones.
     Placements = 9,
+    /// Where a board in the hand is shown.
+    HandHeld = 11,
+    /// What a planted fault draws.
+    Fault = 12,
 }
 
 /// The stream of a purpose for one (a, b), for instance (camera, pose).

@@ -6,6 +6,7 @@ use super::preset::{self, RigPreset};
 use super::render::{PlateView, RenderSettings, Rendered};
 use super::settings::{SceneError, SceneSettings};
 use super::stage::{self, Placement, Wobble};
+use calib_rays::board::BoardSpec;
 use calib_rays::geometry::hull::{convex_hull, hull_contains};
 use calib_rays::geometry::{PixelPoint, Ray, RigidTransform, so3};
 use nalgebra::Vector3;
@@ -47,10 +48,19 @@ impl Scene {
     /// # Errors
     /// [`SceneError::OutOfRange`] if a setting makes no sense.
     pub fn new(settings: SceneSettings) -> Result<Self, SceneError> {
-        settings.check()?;
         let mut rig = preset::rig(settings.optics, settings.sensor);
         rig.scale_spread(settings.spread);
         let placements = preset::placements(&rig, settings.placements, settings.seed);
+        Self::of_rig(settings, rig, placements)
+    }
+
+    /// A rig that no preset knows, its stage at the placements given.
+    pub(super) fn of_rig(
+        settings: SceneSettings,
+        rig: RigPreset,
+        placements: Vec<Placement>,
+    ) -> Result<Self, SceneError> {
+        settings.check()?;
         let left_from_bench = rig.bench_from_camera[0].inverse();
         let wobble = Wobble {
             runout_mm: settings.runout_mm,
@@ -115,13 +125,7 @@ impl Scene {
 
     /// Where a corner really is on the board, bow included, board frame, mm.
     pub fn corner_in_board(&self, row: usize, col: usize) -> Vector3<f64> {
-        let board = &self.settings.board;
-        let mut corner = board.corner_in_board(row, col);
-        let (width_mm, height_mm) = board.extent_mm();
-        let x = 2.0 * corner.x / width_mm - 1.0;
-        let y = 2.0 * corner.y / height_mm - 1.0;
-        corner.z = self.settings.bow_mm * (x * x + y * y) / 2.0;
-        corner
+        bowed_corner(&self.settings.board, self.settings.bow_mm, row, col)
     }
 
     /// Where a corner of a pose falls on a sensor, without noise; `None` if the camera does not
@@ -160,11 +164,9 @@ impl Scene {
         left_from_board: &RigidTransform,
         point_in_board: &Vector3<f64>,
     ) -> Option<PixelPoint> {
-        let point = left_from_board.point(point_in_board);
-        let pixel = self.true_project(camera_idx, &point)?;
-        let ray = self.true_ray_in_left(camera_idx, pixel)?;
-        let facing = ray.direction.dot(&left_from_board.rotation.column(2));
-        (facing > MIN_FACING_COS).then_some(pixel)
+        let camera = self.cameras.get(camera_idx)?;
+        let left_from_camera = self.left_from_camera.get(camera_idx)?;
+        see_board_point(camera, left_from_camera, left_from_board, point_in_board)
     }
 
     /// The board at a pose as a camera takes it, sensor noise included.
@@ -247,4 +249,30 @@ impl Scene {
         }
         f64::from(in_hull) / f64::from(in_image.max(1))
     }
+}
+
+/// Where a corner is on a board whose outermost corners stand `bow_mm` over its middle, board
+/// frame, mm.
+pub(super) fn bowed_corner(board: &BoardSpec, bow_mm: f64, row: usize, col: usize) -> Vector3<f64> {
+    let mut corner = board.corner_in_board(row, col);
+    let (width_mm, height_mm) = board.extent_mm();
+    let x = 2.0 * corner.x / width_mm - 1.0;
+    let y = 2.0 * corner.y / height_mm - 1.0;
+    corner.z = bow_mm * (x * x + y * y) / 2.0;
+    corner
+}
+
+/// The pixel that sees a point of a board (board frame, mm); `None` beyond the sensor's edge, from
+/// behind, or at too flat an angle.
+pub(super) fn see_board_point(
+    camera: &CameraOptics,
+    left_from_camera: &RigidTransform,
+    left_from_board: &RigidTransform,
+    point_in_board: &Vector3<f64>,
+) -> Option<PixelPoint> {
+    let point_in_left = left_from_board.point(point_in_board);
+    let pixel = camera.project(&left_from_camera.inverse().point(&point_in_left))?;
+    let ray = camera.ray(pixel)?.transformed(left_from_camera);
+    let facing = ray.direction.dot(&left_from_board.rotation.column(2));
+    (facing > MIN_FACING_COS).then_some(pixel)
 }

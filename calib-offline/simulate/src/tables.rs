@@ -7,7 +7,8 @@ use super::pattern::{
 use super::scene::Scene;
 use super::settings::OutputSettings;
 use super::target::SeenMarker;
-use calib_rays::geometry::PixelPoint;
+use calib_rays::board::BoardSpec;
+use calib_rays::geometry::{PixelPoint, SensorSize};
 use calib_rays::observed::View;
 use serde_json::json;
 use std::fmt::Write as _;
@@ -18,14 +19,14 @@ pub const TRUTH_SCHEMA: &str = "calib-offline/truth/1";
 const TRUTH_LATTICE: (u32, u32) = (17, 13);
 
 /// `corners.csv`.
-pub(super) fn corner_table(scene: &Scene, views: &[View]) -> String {
+pub(super) fn corner_table(names: &[&str], views: &[View]) -> String {
     let mut text = String::from("camera,pose,row,col,u,v\n");
     for view in views {
         for corner in &view.corners {
             let _ = writeln!(
                 text,
                 "{},{},{},{},{},{}",
-                scene.names[view.camera_idx],
+                names[view.camera_idx],
                 view.pose,
                 corner.row,
                 corner.col,
@@ -66,22 +67,15 @@ pub(super) fn marker_table(scene: &Scene, markers: &[SeenMarker]) -> String {
 /// `dataset.toml`.
 pub(super) fn manifest(scene: &Scene, with_images: bool, with_target: bool) -> String {
     let settings = &scene.settings;
-    let board = &settings.board;
     let mut text = format!(
-        "# Simulated: optics {}, seed {}. The truth is in truth.json.\n\n[board]\nkind = \"chessboard\"\nrows = {}\ncols = {}\nsquare_mm = {:?}\n",
+        "# Simulated: optics {}, seed {}. The truth is in truth.json.\n\n{}",
         settings.optics.name(),
         settings.seed,
-        board.rows,
-        board.cols,
-        board.square_mm
+        board_section(&settings.board)
     );
     for (name, camera) in scene.names.iter().zip(&scene.cameras) {
         let sensor = camera.sensor();
-        let _ = write!(
-            text,
-            "\n[[camera]]\nname = \"{name}\"\nwidth = {}\nheight = {}\n",
-            sensor.width, sensor.height
-        );
+        text.push_str(&camera_section(name, sensor));
         if with_images {
             let _ = writeln!(text, "images = \"{name}/*.png\"");
         }
@@ -89,12 +83,10 @@ pub(super) fn manifest(scene: &Scene, with_images: bool, with_target: bool) -> S
             let _ = writeln!(text, "target_images = \"target/{name}/*.png\"");
         }
     }
-    // Debug writes a list of numbers as TOML does: [-40.0, -35.0].
-    let _ = write!(
-        text,
-        "\n[stage]\nangles_deg = {:?}\nplacement = {:?}\n",
-        scene.pose_angles_deg, scene.pose_placements
-    );
+    text.push_str(&stage_section(
+        &scene.pose_angles_deg,
+        &scene.pose_placements,
+    ));
     if with_target {
         // A pair in a list is written as in TOML once its brackets are.
         let direction = DIRECTION_MARKERS.map(|(row, col)| [row, col]);
@@ -107,13 +99,35 @@ pub(super) fn manifest(scene: &Scene, with_images: bool, with_target: bool) -> S
     text
 }
 
+/// `[board]`.
+pub(super) fn board_section(board: &BoardSpec) -> String {
+    format!(
+        "[board]\nkind = \"chessboard\"\nrows = {}\ncols = {}\nsquare_mm = {:?}\n",
+        board.rows, board.cols, board.square_mm
+    )
+}
+
+/// A `[[camera]]`.
+pub(super) fn camera_section(name: &str, sensor: SensorSize) -> String {
+    format!(
+        "\n[[camera]]\nname = \"{name}\"\nwidth = {}\nheight = {}\n",
+        sensor.width, sensor.height
+    )
+}
+
+/// `[stage]`.
+pub(super) fn stage_section(angles_deg: &[f64], placements: &[usize]) -> String {
+    // Debug writes a list of numbers as TOML does: [-40.0, -35.0].
+    format!("\n[stage]\nangles_deg = {angles_deg:?}\nplacement = {placements:?}\n")
+}
+
 /// A table as `measure` reads it.
 pub(super) fn match_table<'a>(
-    scene: &Scene,
+    names: &[&str],
     rows: impl Iterator<Item = (usize, &'a [PixelPoint])>,
 ) -> String {
     let mut text = String::from("id");
-    for name in &scene.names {
+    for name in names {
         let _ = write!(text, ",u_{name},v_{name}");
     }
     text.push('\n');

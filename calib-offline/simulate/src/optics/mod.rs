@@ -4,6 +4,7 @@
 //! a dome ([`Media`]). The ray of a pixel is what leaves the last surface into the scene.
 
 mod camera;
+mod changed;
 pub mod lens;
 pub mod media;
 mod project;
