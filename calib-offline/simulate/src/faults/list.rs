@@ -141,7 +141,7 @@ pub const FAULTS: &[Fault] = &[
     ),
     fault(
         "mirrored-all",
-        &["labels-mirrored"],
+        &["labels-mirrored", "v-upwards"],
         Step::Written(|r, _| mirror(r, |_| true)),
     ),
     fault(
@@ -359,7 +359,7 @@ pub const FAULTS: &[Fault] = &[
     ),
     fault(
         "origin-right-half",
-        &["pixel-origin", "window-shifted"],
+        &["pixel-origin"],
         Step::Written(|r, _| {
             let half = pose_count(r) / 2;
             count_from_the_edge(r, |view| view.camera_idx == 1 && view.pose < half);

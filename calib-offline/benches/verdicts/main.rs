@@ -1,0 +1,63 @@
+//! What `calibrate` says of recordings with one planted fault, and what a user would then measure:
+//! the tables of `VERDICTS.md`.
+//!
+//! `cargo bench -p calib-offline --bench verdicts -- [--draws N] [--rig plain|wide|window]
+//! [--fault NAME]... [--beside PATH] [--threads N] [--weak]`. Every recording goes to a folder, and a
+//! program as a user has it (today's, and another one `--beside` it) calibrates it and measures 400
+//! exact matches of the true rig, as it is at the end of the recording.
+
+mod arguments;
+mod program;
+mod summary;
+mod table;
+mod weak;
+
+use arguments::Arguments;
+use program::{Outcome, Program};
+use rayon::prelude::*;
+use std::error::Error;
+use std::process::ExitCode;
+
+type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
+
+fn main() -> ExitCode {
+    match Arguments::read(std::env::args().skip(1)).and_then(|arguments| run(&arguments)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<()> {
+    let mut programs = vec![Program::built()];
+    programs.extend(arguments.beside.iter().map(|path| Program::other(path)));
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(arguments.threads)
+        .build()?;
+    pool.install(|| {
+        if !arguments.is_weak_only {
+            verdicts(arguments, &programs)?;
+        }
+        weak::print(arguments, &programs)
+    })
+}
+
+fn verdicts(arguments: &Arguments, programs: &[Program]) -> Result<()> {
+    let cases = arguments.cases();
+    let outcomes = cases
+        .par_iter()
+        .map(|case| {
+            let recorded = case.recorded()?;
+            let of_program = |program| program::outcome(program, &recorded);
+            programs.iter().map(of_program).collect()
+        })
+        .collect::<Result<Vec<Vec<Outcome>>>>()?;
+    for &rig in &arguments.rigs {
+        println!("\n### Rig: {}, {} draws\n", rig.name(), arguments.draws);
+        table::print(rig, programs, &cases, &outcomes);
+    }
+    summary::print(programs, &cases, &outcomes);
+    Ok(())
+}
