@@ -14,10 +14,10 @@ const PLAIN_FOCAL: f64 = 1750.0 / 2050.0;
 /// 124 mm apart before a board half a meter away.
 const PLAIN: Layout = Layout {
     baseline_mm: 124.0,
-    distance_mm: 500.0,
+    distance_mm: 480.0,
     toe_in_mm: 1200.0,
     radius_mm: 60.0,
-    spread_shift_mm: [45.0, 40.0],
+    spread_shift_mm: [32.0, 28.0],
     spread_look_deg: [0.0, 0.0],
 };
 
