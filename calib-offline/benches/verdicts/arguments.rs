@@ -2,7 +2,8 @@
 
 use crate::Result;
 use calib_simulate::SimulateError;
-use calib_simulate::faults::{FAULTS, Fault, Poses, Recording, Rig, plant};
+use calib_simulate::faults::{self, FAULTLESS, Fault, Poses, Recording, Rig, plant};
+use std::fmt::{Display, Formatter};
 use std::path::PathBuf;
 
 /// The command line, read.
@@ -27,6 +28,13 @@ pub struct Case {
     pub rig: Rig,
     pub poses: Poses,
     pub seed: u64,
+}
+
+impl Display for Case {
+    fn fmt(&self, f: &mut Formatter) -> std::fmt::Result {
+        let (rig, poses) = (self.rig.name(), self.poses.name());
+        write!(f, "{rig}, {}, {poses}, draw {}", self.fault.name, self.seed)
+    }
 }
 
 impl Case {
@@ -64,11 +72,10 @@ impl Arguments {
         if read.rigs.is_empty() {
             read.rigs.push(Rig::Plain);
         }
-        let faultless = &FAULTS[0];
         if read.faults.is_empty() {
-            read.faults = FAULTS.iter().collect();
-        } else if read.faults.iter().all(|f| f.name != faultless.name) {
-            read.faults.insert(0, faultless);
+            read.faults = faults::all().collect();
+        } else if read.faults.iter().all(|f| f.name != FAULTLESS.name) {
+            read.faults.insert(0, &FAULTLESS);
         }
         Ok(read)
     }
@@ -99,7 +106,7 @@ fn rig(name: &str) -> Result<Rig> {
 }
 
 fn fault(name: &str) -> Result<&'static Fault> {
-    let names: Vec<_> = FAULTS.iter().map(|fault| fault.name).collect();
-    let found = FAULTS.iter().find(|fault| fault.name == name);
-    Ok(found.ok_or_else(|| format!("no fault {name}; there are {}", names.join(", ")))?)
+    let names: Vec<_> = faults::all().map(|fault| fault.name).collect();
+    let unknown = || format!("no fault {name}; there are {}", names.join(", "));
+    Ok(faults::named(name).ok_or_else(unknown)?)
 }

@@ -51,7 +51,9 @@ fn verdicts(arguments: &Arguments, programs: &[Program]) -> Result<()> {
         .map(|case| {
             let recorded = case.recorded()?;
             let of_program = |program| program::outcome(program, &recorded);
-            programs.iter().map(of_program).collect()
+            let outcomes = programs.iter().map(of_program).collect::<Result<Vec<_>>>();
+            eprintln!("{case}: {}", told(&outcomes));
+            outcomes
         })
         .collect::<Result<Vec<Vec<Outcome>>>>()?;
     for &rig in &arguments.rigs {
@@ -60,4 +62,20 @@ fn verdicts(arguments: &Arguments, programs: &[Program]) -> Result<()> {
     }
     summary::print(programs, &cases, &outcomes);
     Ok(())
+}
+
+/// The verdicts on a recording, for whoever waits.
+fn told(outcomes: &Result<Vec<Outcome>>) -> String {
+    match outcomes {
+        Ok(outcomes) => {
+            let told = outcomes.iter().map(|outcome| {
+                let cause = outcome.cause.as_ref();
+                let cause = cause.map_or("no cause", |(code, _)| code.as_str());
+                let error = outcome.error.map_or(f64::NAN, |error| error.rms);
+                format!("{}, {cause}, {error:.3} mm", outcome.verdict)
+            });
+            told.collect::<Vec<_>>().join("; ")
+        }
+        Err(error) => error.to_string(),
+    }
 }

@@ -8,7 +8,7 @@ use calib_estimate::adjust::Observations;
 use calib_estimate::pinhole::{RigSettings, calibrate_rig};
 use calib_offline::methods::pinhole::PinholeRays;
 use calib_rays::measure::PointSource;
-use calib_simulate::faults::{FAULTS, Poses, Recording};
+use calib_simulate::faults::{self, Poses, Recording};
 use rayon::prelude::*;
 
 /// Faults of the geometry alone, and none.
@@ -28,7 +28,7 @@ pub fn print(arguments: &Arguments, programs: &[Program]) -> Result<()> {
     );
     println!("| --- | --- |{}", " --- |".repeat(names.len()));
     for &rig in &arguments.rigs {
-        for fault in FAULTS.iter().filter(|fault| WEAK.contains(&fault.name)) {
+        for fault in WEAK.iter().filter_map(|name| faults::named(name)) {
             let draws = (1..=arguments.draws).into_par_iter();
             let squares = draws
                 .map(|seed| {

@@ -1,16 +1,63 @@
-//! Corners that were given wrong labels, views that were given wrong cameras or numbers.
+//! Corners with wrong labels.
 
+use super::fault::{Fault, Step, fault, some_poses, unseen};
 use super::recording::Recording;
 use calib_rays::observed::View;
+use rand_chacha::ChaCha8Rng;
+
+pub(super) const FAULTS: &[Fault] = &[
+    fault(
+        "half-turn-some",
+        &["labels-turned"],
+        Step::Written(half_turn_some),
+    ),
+    fault(
+        "mirrored-some",
+        &["labels-mirrored"],
+        Step::Written(|written, rng| {
+            let some = some_poses(written.pose_count(), rng);
+            mirror(written, |view| {
+                view.camera_idx == 1 && some.contains(&view.pose)
+            });
+        }),
+    ),
+    // What all corners show is a mirrored world, and not which of the two it comes from.
+    fault(
+        "mirrored-all",
+        &["labels-mirrored", "v-upwards"],
+        Step::Written(|written, _| mirror(written, |_| true)),
+    ),
+    fault(
+        "row-shift-right-one",
+        &["labels-shifted"],
+        Step::Written(|written, rng| {
+            let one = some_poses(written.pose_count(), rng)[0];
+            shift_rows(written, |view| view.camera_idx == 1 && view.pose == one);
+        }),
+    ),
+    unseen(
+        "row-shift-both-one",
+        &["labels-shifted"],
+        Step::Written(|written, rng| {
+            let one = some_poses(written.pose_count(), rng)[0];
+            shift_rows(written, |view| view.pose == one);
+        }),
+    ),
+    fault(
+        "row-shift-right-all",
+        &["labels-shifted"],
+        Step::Written(|written, _| shift_rows(written, |view| view.camera_idx == 1)),
+    ),
+];
 
 /// Gives the corners of some views other labels; those that fall off the board are lost.
-pub(super) fn relabel(
-    recording: &mut Recording,
+fn relabel(
+    written: &mut Recording,
     is_one: impl Fn(&View) -> bool,
     label: impl Fn(usize, usize) -> (usize, usize),
 ) {
-    let board = recording.board;
-    for view in recording.views.iter_mut().filter(|view| is_one(view)) {
+    let board = written.board;
+    for view in written.views.iter_mut().filter(|view| is_one(view)) {
         for corner in &mut view.corners {
             (corner.row, corner.col) = label(corner.row, corner.col);
         }
@@ -20,52 +67,24 @@ pub(super) fn relabel(
     }
 }
 
-/// Numbers the columns of some views from the other end, as in a mirror.
-pub(super) fn mirror(recording: &mut Recording, is_one: impl Fn(&View) -> bool) {
-    let last = recording.board.cols - 1;
-    relabel(recording, is_one, |row, col| (row, last - col));
+/// Numbers some views of the right camera from the opposite end.
+fn half_turn_some(written: &mut Recording, rng: &mut ChaCha8Rng) {
+    let some = some_poses(written.pose_count(), rng);
+    let board = written.board;
+    relabel(
+        written,
+        |view| view.camera_idx == 1 && some.contains(&view.pose),
+        |row, col| board.half_turned(row, col),
+    );
 }
 
-/// Numbers rows and columns of some views from the other end.
-pub(super) fn half_turn(recording: &mut Recording, is_one: impl Fn(&View) -> bool) {
-    let board = recording.board;
-    relabel(recording, is_one, |row, col| board.half_turned(row, col));
+/// Numbers the columns of some views from the other end, as in a mirror.
+fn mirror(written: &mut Recording, is_one: impl Fn(&View) -> bool) {
+    let last = written.board.cols - 1;
+    relabel(written, is_one, |row, col| (row, last - col));
 }
 
 /// Counts the rows of some views from 1.
-pub(super) fn shift_rows(recording: &mut Recording, is_one: impl Fn(&View) -> bool) {
-    relabel(recording, is_one, |row, col| (row + 1, col));
-}
-
-/// Gives the views of some poses to the other camera.
-pub(super) fn exchange_cameras(recording: &mut Recording, is_one: impl Fn(usize) -> bool) {
-    for view in recording.views.iter_mut().filter(|view| is_one(view.pose)) {
-        view.camera_idx = 1 - view.camera_idx;
-    }
-    recording
-        .views
-        .sort_by_key(|view| (view.camera_idx, view.pose));
-}
-
-/// Loses the first image of the right camera's, so that each stands beside the next pose's of the left.
-pub(super) fn right_one_late(recording: &mut Recording) {
-    recording.views.retain_mut(|view| {
-        let is_first = view.pose == 0;
-        if view.camera_idx == 1 && !is_first {
-            view.pose -= 1;
-        }
-        view.camera_idx == 0 || !is_first
-    });
-}
-
-/// Takes the corners of so many positions for all poses in turn.
-pub(super) fn repeat_positions(recording: &mut Recording, positions: usize, poses: usize) {
-    let originals = recording.views.clone();
-    for view in &mut recording.views {
-        let source = view.pose % positions * poses / positions;
-        let is_source = |v: &&View| v.camera_idx == view.camera_idx && v.pose == source;
-        if let Some(original) = originals.iter().find(is_source) {
-            view.corners.clone_from(&original.corners);
-        }
-    }
+fn shift_rows(written: &mut Recording, is_one: impl Fn(&View) -> bool) {
+    relabel(written, is_one, |row, col| (row + 1, col));
 }

@@ -1,23 +1,48 @@
 //! Recordings in which one thing is wrong, and known: what a verdict is judged by.
 //!
-//! [`FAULTS`] lists them. Each says by which code a program ought to name it, and whether the corners
-//! can show it at all. [`plant`] makes the recording: a session with the fault in its scene, its
-//! cameras or its board, or what was written down of a faultless one, made wrong.
+//! [`all`] lists them. Each says by which code a program ought to name it, and whether the corners can
+//! show it at all. [`plant`] makes the recording: of a session with the fault in its scene, its cameras
+//! or its board, or from what was written down of a faultless one, made wrong.
 
+mod board;
+mod exposure;
+mod fault;
+mod half_way;
 mod labels;
-mod list;
+mod numbers;
 mod pixels;
 mod recording;
 mod rigs;
 mod session;
+mod shown;
 
-pub use list::{FAULTS, Fault, Step};
+pub use fault::{FAULTLESS, Fault, Step};
 pub use recording::{Dial, ExactMatch, MATCHES, Recording};
 pub use rigs::{Motion, Poses, Rig, scene};
 pub use session::{Session, Take};
 
 use crate::random::{self, Purpose};
 use crate::settings::SceneError;
+
+/// Every fault by name, [`FAULTLESS`] first.
+pub fn all() -> impl Iterator<Item = &'static Fault> {
+    let kinds = [
+        &[FAULTLESS],
+        board::FAULTS,
+        labels::FAULTS,
+        numbers::FAULTS,
+        shown::FAULTS,
+        exposure::FAULTS,
+        half_way::FAULTS,
+        pixels::FAULTS,
+    ];
+    kinds.into_iter().flatten()
+}
+
+/// The fault of a name.
+pub fn named(name: &str) -> Option<&'static Fault> {
+    all().find(|fault| fault.name == name)
+}
 
 /// The recording of a fault, everything random by the seed.
 ///
@@ -53,3 +78,6 @@ pub fn plant(fault: &Fault, rig: Rig, poses: Poses, seed: u64) -> Result<Recordi
     };
     Ok(recording)
 }
+
+#[cfg(test)]
+mod tests;

@@ -91,6 +91,12 @@ impl Recording {
         Ok(())
     }
 
+    /// Number of poses.
+    pub fn pose_count(&self) -> usize {
+        let last = self.views.iter().map(|view| view.pose).max();
+        last.map_or(0, |pose| pose + 1)
+    }
+
     /// Numbers the poses that are left from 0 on, and the dial with them.
     pub fn keep_poses(&mut self, kept: &[usize]) {
         self.views.retain_mut(|view| {

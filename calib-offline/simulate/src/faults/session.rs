@@ -7,6 +7,11 @@ use calib_rays::geometry::{PixelPoint, RigidTransform};
 use calib_rays::observed::View;
 use nalgebra::Vector3;
 
+/// Indices of cameras.
+pub(super) const LEFT: &[usize] = &[0];
+pub(super) const RIGHT: &[usize] = &[1];
+pub(super) const BOTH: &[usize] = &[0, 1];
+
 /// How one camera sees one pose.
 #[derive(Debug, Clone)]
 pub struct Take {
@@ -82,12 +87,12 @@ impl Session {
     /// The takes of some cameras in the second half of the poses.
     pub fn second_half(&mut self, cameras: &[usize]) -> impl Iterator<Item = &mut Take> {
         let half = self.pose_count() / 2;
-        self.of(cameras)
+        self.takes_of(cameras)
             .filter_map(move |(pose, take)| (pose >= half).then_some(take))
     }
 
     /// All takes of some cameras, with their poses.
-    pub fn of(&mut self, cameras: &[usize]) -> impl Iterator<Item = (usize, &mut Take)> {
+    pub fn takes_of(&mut self, cameras: &[usize]) -> impl Iterator<Item = (usize, &mut Take)> {
         let takes = self.takes.iter_mut().enumerate();
         takes
             .filter(|(camera_idx, _)| cameras.contains(camera_idx))
