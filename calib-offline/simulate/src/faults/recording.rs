@@ -3,6 +3,7 @@
 use super::session::Session;
 use crate::error::SimulateError;
 use crate::matches::MatchSet;
+use crate::optics::CameraOptics;
 use crate::scene::Scene;
 use crate::tables::{board_section, camera_section, corner_table, match_table, stage_section};
 use calib_rays::board::BoardSpec;
@@ -56,7 +57,7 @@ impl Recording {
         Self {
             board: scene.settings.board,
             names: scene.names.clone(),
-            sensors: scene.cameras.iter().map(|camera| camera.sensor()).collect(),
+            sensors: scene.cameras.iter().map(CameraOptics::sensor).collect(),
             dial: has_dial.then(|| Dial {
                 angles_deg: scene.pose_angles_deg.clone(),
                 placements: scene.pose_placements.clone(),
