@@ -6,6 +6,9 @@ use calib_simulate::faults::{self, FAULTLESS, Fault, Poses, Recording, Rig, plan
 use std::fmt::{Display, Formatter};
 use std::path::PathBuf;
 
+/// Faults of the geometry alone, and none.
+pub const WEAK: [&str; 3] = [FAULTLESS.name, "few-tilts", "frontal-one-depth"];
+
 /// The command line, read.
 pub struct Arguments {
     /// Recordings of a fault.
@@ -72,7 +75,9 @@ impl Arguments {
         if read.rigs.is_empty() {
             read.rigs.push(Rig::Plain);
         }
-        if read.faults.is_empty() {
+        if read.is_weak_only {
+            read.faults = WEAK.into_iter().filter_map(faults::named).collect();
+        } else if read.faults.is_empty() {
             read.faults = faults::all().collect();
         } else if read.faults.iter().all(|f| f.name != FAULTLESS.name) {
             read.faults.insert(0, &FAULTLESS);
@@ -85,8 +90,12 @@ impl Arguments {
         let mut cases = Vec::new();
         for &rig in &self.rigs {
             for &fault in &self.faults {
+                let only = match fault.only {
+                    None if self.is_weak_only => Some(Poses::HandHeld),
+                    only => only,
+                };
                 let all = Poses::ALL.into_iter();
-                for poses in all.filter(|poses| fault.only.is_none_or(|only| only == *poses)) {
+                for poses in all.filter(|poses| only.is_none_or(|only| only == *poses)) {
                     cases.extend((1..=self.draws).map(|seed| Case {
                         fault,
                         rig,

@@ -12,7 +12,7 @@ mod summary;
 mod table;
 mod weak;
 
-use arguments::Arguments;
+use arguments::{Arguments, Case};
 use program::{Outcome, Program};
 use rayon::prelude::*;
 use std::error::Error;
@@ -36,17 +36,21 @@ fn run(arguments: &Arguments) -> Result<()> {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(arguments.threads)
         .build()?;
-    pool.install(|| {
-        if !arguments.is_weak_only {
-            verdicts(arguments, &programs)?;
+    let cases = arguments.cases();
+    let outcomes = pool.install(|| outcomes(&programs, &cases))?;
+    if !arguments.is_weak_only {
+        for &rig in &arguments.rigs {
+            println!("\n### Rig: {}, {} draws\n", rig.name(), arguments.draws);
+            table::print(rig, &programs, &cases, &outcomes);
         }
-        weak::print(arguments, &programs)
-    })
+        summary::print(&programs, &cases, &outcomes);
+    }
+    weak::print(&programs, &cases, &outcomes)
 }
 
-fn verdicts(arguments: &Arguments, programs: &[Program]) -> Result<()> {
-    let cases = arguments.cases();
-    let outcomes = cases
+/// Of every case, what every program says.
+fn outcomes(programs: &[Program], cases: &[Case]) -> Result<Vec<Vec<Outcome>>> {
+    cases
         .par_iter()
         .map(|case| {
             let recorded = case.recorded()?;
@@ -55,13 +59,7 @@ fn verdicts(arguments: &Arguments, programs: &[Program]) -> Result<()> {
             eprintln!("{case}: {}", told(&outcomes));
             outcomes
         })
-        .collect::<Result<Vec<Vec<Outcome>>>>()?;
-    for &rig in &arguments.rigs {
-        println!("\n### Rig: {}, {} draws\n", rig.name(), arguments.draws);
-        table::print(rig, programs, &cases, &outcomes);
-    }
-    summary::print(programs, &cases, &outcomes);
-    Ok(())
+        .collect()
 }
 
 /// The verdicts on a recording, for whoever waits.

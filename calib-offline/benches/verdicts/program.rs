@@ -93,7 +93,7 @@ pub fn outcome(program: &Program, recording: &Recording) -> Result<Outcome> {
     Ok(Outcome {
         verdict: verdict.unwrap_or("refused").to_owned(),
         cause,
-        reason: first_reason(&said),
+        reason: first_reason(&said).replace(&format!("{}/", folder.path().display()), ""),
         error,
     })
 }

@@ -119,6 +119,16 @@ pub fn print(programs: &[Program], cases: &[Case], all: &[Vec<Outcome>]) {
             share(named.count(), all.len())
         },
     );
+    row("change half way, named: since its first pose", &|rows| {
+        let named = |row: &&Row| row.case.fault.is_half_way && is_named(row.case, row.outcome);
+        let all: Vec<_> = rows.iter().filter(named).collect();
+        let since = |row: &&&Row| {
+            let cause = row.outcome.cause.as_ref();
+            let half = row.case.poses.count() / 2;
+            cause.and_then(|(_, since)| *since) == Some(half as u64)
+        };
+        share(all.iter().filter(since).count(), all.len())
+    });
     row("faultless: not \"pass\"", &|rows| {
         let all: Vec<_> = rows.iter().filter(|row| is_faultless(row.case)).collect();
         let not = all.iter().filter(|row| !row.outcome.is_silent()).count();

@@ -15,7 +15,11 @@ pub fn print(rig: Rig, programs: &[Program], cases: &[Case], all: &[Vec<Outcome>
     let mut head = String::from("| fault | shown | to be named |");
     for program in programs {
         let name = program.name;
-        head += &format!(" {name}: error RMS (max), mm | verdict | first cause | right | why |");
+        head.extend([
+            " ",
+            name,
+            ": error RMS (max), mm | verdict | first cause | right | why |",
+        ]);
     }
     println!("{head}");
     println!("|{}", " --- |".repeat(head.matches('|').count() - 1));
@@ -51,9 +55,8 @@ fn cells(outcomes: &[(&Case, &Outcome)], faultless_mm: f64) -> String {
     let verdicts = counted(outcomes.iter().map(|(_, outcome)| outcome.verdict.clone()));
     let causes = counted(outcomes.iter().map(|(_, outcome)| match &outcome.cause {
         None => "-".to_owned(),
-        Some((code, None)) => code.clone(),
         Some((code, Some(pose))) if outcomes.len() == 1 => format!("{code} from {pose}"),
-        Some((code, Some(_))) => code.clone(),
+        Some((code, _)) => code.clone(),
     }));
     let right = counted(outcomes.iter().map(|(case, outcome)| {
         let named = if is_named(case, outcome) {
@@ -118,11 +121,9 @@ fn counted(texts: impl Iterator<Item = String>) -> String {
         }
     }
     counts.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-    match &counts[..] {
-        [(text, _)] => text.clone(),
-        _ => {
-            let parts = counts.iter().map(|(text, count)| format!("{count} {text}"));
-            parts.collect::<Vec<_>>().join(", ")
-        }
+    if let [(text, _)] = &counts[..] {
+        return text.clone();
     }
+    let parts = counts.iter().map(|(text, count)| format!("{count} {text}"));
+    parts.collect::<Vec<_>>().join(", ")
 }

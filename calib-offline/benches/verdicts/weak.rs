@@ -2,70 +2,69 @@
 //! together on the same corners, as the usual libraries have it.
 
 use crate::Result;
-use crate::arguments::{Arguments, Case};
-use crate::program::{self, Program, error_mm};
+use crate::arguments::{Case, WEAK};
+use crate::program::{ErrorMm, Outcome, Program, error_mm};
 use calib_estimate::adjust::Observations;
 use calib_estimate::pinhole::{RigSettings, calibrate_rig};
 use calib_offline::methods::pinhole::PinholeRays;
 use calib_rays::measure::PointSource;
-use calib_simulate::faults::{self, Poses, Recording};
-use rayon::prelude::*;
+use calib_simulate::faults::{Poses, Rig};
 
-/// Faults of the geometry alone, and none.
-const WEAK: [&str; 3] = ["none", "few-tilts", "frontal-one-depth"];
-
-/// Prints a row per fault: RMS error over all draws, mm, of the pinhole and of every program.
-pub fn print(arguments: &Arguments, programs: &[Program]) -> Result<()> {
-    let asked = |name: &str| arguments.faults.iter().any(|fault| fault.name == name);
-    if !arguments.is_weak_only && !asked(WEAK[1]) && !asked(WEAK[2]) {
+/// Prints a row per rig and fault of [`WEAK`] that was shown by hand, if there are others than none: RMS
+/// error over all draws, mm, of the pinhole and of every program.
+pub fn print(programs: &[Program], cases: &[Case], all: &[Vec<Outcome>]) -> Result<()> {
+    let is_row = |case: &Case| WEAK.contains(&case.fault.name) && case.poses == Poses::HandHeld;
+    if !cases
+        .iter()
+        .any(|case| is_row(case) && case.fault.name != WEAK[0])
+    {
         return Ok(());
     }
     let names: Vec<_> = programs.iter().map(|program| program.name).collect();
     println!(
-        "\n| hand-held, {} draws, RMS mm | pinhole, 5 numbers | {} |",
-        arguments.draws,
+        "\n| hand-held, RMS mm | pinhole, 5 numbers | {} |",
         names.join(" | ")
     );
     println!("| --- | --- |{}", " --- |".repeat(names.len()));
-    for &rig in &arguments.rigs {
-        for fault in WEAK.iter().filter_map(|name| faults::named(name)) {
-            let draws = (1..=arguments.draws).into_par_iter();
-            let squares = draws
-                .map(|seed| {
-                    let case = Case {
-                        fault,
-                        rig,
-                        poses: Poses::HandHeld,
-                        seed,
-                    };
-                    squares(&case.recorded()?, programs)
+    for rig in Rig::ALL {
+        for name in WEAK {
+            let draws: Vec<usize> = (0..cases.len())
+                .filter(|&k| {
+                    is_row(&cases[k]) && cases[k].rig == rig && cases[k].fault.name == name
                 })
-                .collect::<Result<Vec<_>>>()?;
-            let rms = |of: usize| {
-                let found: Vec<f64> = squares.iter().filter_map(|draw| draw[of]).collect();
-                (found.iter().sum::<f64>() / found.len() as f64).sqrt()
-            };
-            let pinhole = rms(0);
-            let cells: Vec<_> = (1..=programs.len())
-                .map(|k| format!("{:.4}, {:.2} times", rms(k), rms(k) / pinhole))
                 .collect();
-            println!(
-                "| {}: {} | {pinhole:.4} | {} |",
-                rig.name(),
-                fault.name,
-                cells.join(" | ")
-            );
+            if draws.is_empty() {
+                continue;
+            }
+            let pinhole = draws.iter().map(|&k| pinhole(&cases[k]));
+            let pinhole = rms(&pinhole.collect::<Result<Vec<_>>>()?);
+            let cells = (0..programs.len()).map(|program| {
+                let errors: Vec<_> = draws.iter().map(|&k| all[k][program].error).collect();
+                let error = rms(&errors);
+                format!(" {error:.4}, {:.2} times |", error / pinhole)
+            });
+            let cells: String = cells.collect();
+            println!("| {}: {name} | {pinhole:.4} |{cells}", rig.name());
         }
     }
     Ok(())
 }
 
-/// Squared RMS error of the pinhole and of every program, mm2; `None` if there is no calibration.
-fn squares(recording: &Recording, programs: &[Program]) -> Result<Vec<Option<f64>>> {
+fn rms(errors: &[Option<ErrorMm>]) -> f64 {
+    let squares: Vec<f64> = errors
+        .iter()
+        .flatten()
+        .map(|error| error.rms.powi(2))
+        .collect();
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+}
+
+/// Error of the pinhole on a recording; `None` if it does not measure.
+fn pinhole(case: &Case) -> Result<Option<ErrorMm>> {
+    let recording = case.recorded()?;
     let sensors = recording.sensors.clone();
     let observations = Observations::new(recording.board, sensors, &recording.views);
-    let pinhole = calibrate_rig(&observations, &RigSettings::default())?;
-    let rays = PinholeRays::new(pinhole);
+    let rays = PinholeRays::new(calibrate_rig(&observations, &RigSettings::default())?);
     let points: Vec<_> = recording
         .matches
         .iter()
@@ -75,12 +74,5 @@ fn squares(recording: &Recording, programs: &[Program]) -> Result<Vec<Option<f64
             Some(rays.point(&sightings).ok()?.point_mm.into())
         })
         .collect();
-    let mut errors = vec![error_mm(&points, &recording.matches)];
-    for program in programs {
-        errors.push(program::outcome(program, recording)?.error);
-    }
-    let errors = errors.into_iter();
-    Ok(errors
-        .map(|error| error.map(|error| error.rms * error.rms))
-        .collect())
+    Ok(error_mm(&points, &recording.matches))
 }

@@ -33,6 +33,8 @@ pub struct Fault {
     pub is_visible: bool,
     /// The only way of showing the board that has it, if not both have.
     pub only: Option<Poses>,
+    /// Whether it begins with the second half of the poses.
+    pub is_half_way: bool,
     /// How it is planted.
     pub step: Step,
 }
@@ -47,6 +49,7 @@ pub(super) const fn fault(name: &'static str, codes: &'static [&'static str], st
         codes,
         is_visible: true,
         only: None,
+        is_half_way: false,
         step,
     }
 }
@@ -59,6 +62,18 @@ pub(super) const fn unseen(
 ) -> Fault {
     Fault {
         is_visible: false,
+        ..fault(name, codes, step)
+    }
+}
+
+/// One that begins with the second half of the poses.
+pub(super) const fn half_way(
+    name: &'static str,
+    codes: &'static [&'static str],
+    step: Step,
+) -> Fault {
+    Fault {
+        is_half_way: true,
         ..fault(name, codes, step)
     }
 }

@@ -1,47 +1,47 @@
 //! A rig that is another one from half of the poses on.
 
-use super::fault::{Fault, Step, fault};
+use super::fault::{Fault, Step, half_way};
 use super::session::{BOTH, LEFT, RIGHT, Session};
 use crate::optics::CameraOptics;
 use calib_rays::geometry::{RigidTransform, so3};
 use nalgebra::Vector3;
 
 pub(super) const FAULTS: &[Fault] = &[
-    fault(
+    half_way(
         "focus-both",
         &["focus-changed"],
         Step::Session(|session, _| change(session, BOTH, |camera| camera.refocused(1.001))),
     ),
-    fault(
+    half_way(
         "focus-left",
         &["focus-changed"],
         Step::Session(|session, _| change(session, LEFT, |camera| camera.refocused(1.001))),
     ),
-    fault(
+    half_way(
         "half-size",
         &["image-size"],
         Step::Session(|session, _| change(session, BOTH, CameraOptics::half_size)),
     ),
-    fault(
+    half_way(
         "window-both",
         &["window-shifted"],
         Step::Session(|session, _| {
             change(session, BOTH, |camera| camera.window_moved([40.0, 24.0]));
         }),
     ),
-    fault(
+    half_way(
         "window-right",
         &["window-shifted"],
         Step::Session(|session, _| {
             change(session, RIGHT, |camera| camera.window_moved([4.0, 0.0]));
         }),
     ),
-    fault(
+    half_way(
         "right-turned",
         &["camera-moved"],
         Step::Session(|session, _| turn_right(session)),
     ),
-    fault(
+    half_way(
         "baseline",
         &["baseline-changed", "camera-moved"],
         Step::Session(|session, _| {

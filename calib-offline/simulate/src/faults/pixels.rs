@@ -1,6 +1,6 @@
 //! Pixels in another convention, or badly found.
 
-use super::fault::{Fault, Step, fault, unseen};
+use super::fault::{Fault, Step, fault, half_way, unseen};
 use super::recording::Recording;
 use calib_rays::geometry::PixelPoint;
 use calib_rays::observed::View;
@@ -12,7 +12,8 @@ pub(super) const FAULTS: &[Fault] = &[
         &["pixel-origin"],
         Step::Written(|written, _| count_from_edge(written, |view| view.camera_idx == 1)),
     ),
-    fault(
+    // Which half has the other convention, the corners cannot say.
+    half_way(
         "origin-right-half",
         &["pixel-origin"],
         Step::Written(|written, _| {
