@@ -163,7 +163,9 @@ fn imports(text: &str) -> Imports {
     for (at, _) in code.match_indices("use ") {
         let line_start = code[..at].rfind('\n').map_or(0, |k| k + 1);
         let before = code[line_start..at].trim();
-        if !(before.is_empty() || before.starts_with("pub")) {
+        // The end of a longer word, as in `pub enum Cause {`, imports nothing.
+        let is_public = before == "pub" || before.starts_with("pub(") && before.ends_with(')');
+        if !(before.is_empty() || is_public) {
             continue;
         }
         let end = code[at..].find(';').map_or(code.len(), |k| at + k);
