@@ -18,7 +18,8 @@ pub use offered::{Offered, camera_names, explained, offered};
 use crate::methods::{Given, Joint, Method, Own, fit_folds};
 use crate::report::Calibration;
 use calib_estimate::adjust::Observations;
-use calib_judge::half_data::first_half;
+use calib_judge::agreement::{Whole, agreement};
+use calib_judge::half_data::splits;
 use calib_judge::held_out::folds_wanted;
 use calib_judge::verdict::Thresholds;
 use calib_judge::{Folds, held_out};
@@ -149,24 +150,38 @@ pub fn calibrate_corners(
 
     let used = &solution.observations;
     let folds = folds_wanted(used, settings.folds);
-    let half = first_half(used.poses.iter().copied(), |pose| {
+    let halves = splits(used.poses.iter().copied(), |pose| {
         given.placements.get(&pose).copied()
     });
-    let half = (settings.folds > 0).then_some(&half);
+    let halves: &[_] = if settings.folds > 0 { &halves } else { &[] };
     progress.begin("cross-checks", folds);
-    let (folds, checks) = rayon::join(
+    let (folds, (checks, mut causes)) = rayon::join(
         || fit_folds(settings.method, &given, used, folds, progress),
-        || solution.own.check(&solution.rig, half),
+        || {
+            rayon::join(
+                || solution.own.check(&solution.rig, halves),
+                || solution.own.suspects(&solution.rig),
+            )
+        },
     );
     progress.end();
-    let mut causes = Vec::new();
     calib_judge::cause::sort(&mut causes);
+    let whole = Whole {
+        rig: &solution.rig,
+        board_shape: &solution.board_shape,
+        observations: &solution.observations,
+        is_used: &solution.is_used,
+        freedom: solution.own.freedom(),
+    };
     let calibration = summary::record(&Parts {
         dataset,
         corners,
         observations: &observations,
         solution: &solution,
         held_out: &held_out(&folds),
+        agreement: agreement(&whole, &folds),
+        mm_per_px: solution.mm_per_px(),
+        left_open_mm: solution.own.left_open_mm(&solution.rig),
         checks: checks.as_ref(),
         causes: &causes,
         thresholds: &settings.thresholds,

@@ -1,7 +1,7 @@
 //! What is wrong with a recording: one vocabulary for what is seen before a fit, what the fit shows,
 //! and what a later check of the calibration finds.
 
-use super::verdict::Grade;
+use super::grade::Grade;
 use serde::{Deserialize, Serialize};
 
 /// Something found about a recording or a calibration.

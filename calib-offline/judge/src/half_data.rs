@@ -13,6 +13,7 @@
 //! simulated rigs (8 draws each, BENCHMARKS.md) its RMS is 0.98 for a plain lens, 1.02 behind flat
 //! ports, 0.72 with weak and 0.60 with strong local distortion.
 
+use super::agreement::BY_CHANCE_SD;
 use super::working_volume::{Match, compare, lattice, matches_at};
 use calib_estimate::joint::Estimate;
 use calib_estimate::joint::point_covariance::{across_motions, without_motions};
@@ -25,8 +26,32 @@ use std::collections::BTreeSet;
 
 /// Fewer poses are not halved: five hold no flexible field.
 pub const MIN_POSES: usize = 10;
-/// Quantile of the standard normal distribution: 95 % lie within so many standard deviations.
-const NORMAL_95: f64 = 1.96;
+
+/// A check that only finds errors of so many times what is predicted is none.
+const SHOWS_NOTHING: f64 = 3.0;
+
+/// How the poses are divided in two.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Split {
+    /// Every other one: what changes with time is in both halves.
+    InTurn,
+    /// The first half of the recording and the second.
+    ByTime,
+    /// By placement of the stage.
+    ByPlacement,
+}
+
+impl Split {
+    /// In words.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::InTurn => "halves dealt in turn",
+            Self::ByTime => "first and second half",
+            Self::ByPlacement => "halves by placement",
+        }
+    }
+}
 
 /// The check, or why there is none.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -73,7 +98,7 @@ pub struct HalfData {
     /// Number of independent ways in which the difference can vary, to judge the ratio by: few, as
     /// a field errs smoothly.
     pub modes: f64,
-    /// Where the ratio falls by chance in 95 of 100 cases if the covariances are right.
+    /// Where the ratio falls by chance in 999 of 1000 cases if the covariances are right.
     pub ratio_by_chance: [f64; 2],
 }
 
@@ -81,6 +106,12 @@ impl HalfData {
     /// Whether the halves differ by more than chance explains.
     pub fn is_larger(&self) -> bool {
         self.ratio > self.ratio_by_chance[1]
+    }
+
+    /// Whether even a difference of so many times the prediction would be chance: then the check shows
+    /// nothing.
+    pub fn shows_nothing(&self) -> bool {
+        self.ratio_by_chance[1] > SHOWS_NOTHING
     }
 
     /// Whether they differ by less.
@@ -101,17 +132,32 @@ pub struct Halves {
     pub rigs: [Rig; 2],
 }
 
-/// Which poses are in the first half: every other one of each placement, in the order of their
-/// numbers, so that both halves have all angles and all placements. Poses without a placement
-/// count as one.
-pub fn first_half(
+/// The ways to divide some poses (by number), each with the poses of its first half. In turn means every
+/// other one of each placement, in the order of their numbers, so that both halves have all angles and
+/// all placements; poses without a placement count as one. Placements that follow each other in time
+/// divide as time does, and count once.
+pub fn splits(
     poses: impl IntoIterator<Item = usize>,
     placement: impl Fn(usize) -> Option<usize>,
-) -> BTreeSet<usize> {
+) -> Vec<(Split, BTreeSet<usize>)> {
     let poses: BTreeSet<usize> = poses.into_iter().collect();
+    let half = poses.len().div_ceil(2);
+    let by_time: BTreeSet<usize> = poses.iter().copied().take(half).collect();
     let mut by_placement: Vec<usize> = poses.into_iter().collect();
     by_placement.sort_by_key(|pose| (placement(*pose), *pose));
-    by_placement.into_iter().step_by(2).collect()
+    let in_turn = by_placement.iter().copied().step_by(2).collect();
+    let mut splits = vec![(Split::InTurn, in_turn), (Split::ByTime, by_time.clone())];
+    // Whole placements, as many as make up half.
+    let of = |at: usize| by_placement.get(at).map(|pose| placement(*pose));
+    let last = of(half.saturating_sub(1));
+    let first: BTreeSet<usize> = (0..by_placement.len())
+        .filter(|at| of(*at) <= last)
+        .map(|at| by_placement[at])
+        .collect();
+    if first.len() < by_placement.len() && first != by_time {
+        splits.push((Split::ByPlacement, first));
+    }
+    splits
 }
 
 /// Estimates both halves, as `Estimate::of_poses` does.
@@ -169,7 +215,7 @@ impl Halves {
             predicted_rms_mm,
             ratio,
             modes,
-            ratio_by_chance: [-NORMAL_95, NORMAL_95].map(|z| ratio_quantile(modes, z)),
+            ratio_by_chance: [-BY_CHANCE_SD, BY_CHANCE_SD].map(|z| ratio_quantile(modes, z)),
         })
     }
 
@@ -235,7 +281,7 @@ impl Halves {
 
 /// How far the second field's rays pass from points on the first's, along the axes across the
 /// rays, the best rigid motion of the camera taken out, mm; `None` of too few pixels.
-fn rays_apart(
+pub fn rays_apart(
     first: &RayField,
     second: &RayField,
     pixels: &[PixelPoint],
@@ -271,15 +317,27 @@ mod tests {
     #[test]
     fn halves_alternate_within_placements_and_are_even() {
         // Two placements of five, recorded in turn.
-        let half = first_half(0..10, |pose| Some(pose % 2));
-        assert_eq!(half, BTreeSet::from([0, 4, 8, 3, 7]));
-        let free = first_half([9, 3, 5, 3], |_| None);
-        assert_eq!(free, BTreeSet::from([3, 9]));
+        let found = splits(0..10, |pose| Some(pose % 2));
+        assert_eq!(
+            found,
+            [
+                (Split::InTurn, BTreeSet::from([0, 4, 8, 3, 7])),
+                (Split::ByTime, BTreeSet::from([0, 1, 2, 3, 4])),
+                (Split::ByPlacement, BTreeSet::from([0, 2, 4, 6, 8])),
+            ]
+        );
+        // Placements in time's order, and none.
+        assert_eq!(splits(0..10, |pose| Some(pose / 5)).len(), 2);
+        let free = splits([9, 3, 5, 3], |_| None);
+        assert_eq!(free[0], (Split::InTurn, BTreeSet::from([3, 9])));
+        assert_eq!(free[1], (Split::ByTime, BTreeSet::from([3, 5])));
+        assert_eq!(free.len(), 2);
     }
 
     #[test]
     fn chance_is_that_of_chi_square() {
         // Chi-square of 10: 2.5 % lie below 3.247 and 2.5 % above 20.483.
+        const NORMAL_95: f64 = 1.96;
         assert!((ratio_quantile(10.0, -NORMAL_95) - 0.3247_f64.sqrt()).abs() < 3e-3);
         assert!((ratio_quantile(10.0, NORMAL_95) - 2.0483_f64.sqrt()).abs() < 3e-3);
         // One mode: a normal variable's size, 2.241 (the formula gives 2.22).

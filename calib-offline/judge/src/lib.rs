@@ -1,16 +1,20 @@
 //! Judging: what a recording covers before a calibration, and what the calibration is worth after
 //! it, on boards that it never saw, in millimeters and in pixels.
 
+pub mod agreement;
 pub mod cause;
 pub mod central_model;
 pub mod centrality;
 pub mod cross_checks;
+pub mod grade;
 pub mod half_data;
 pub mod held_out;
 pub mod known_points;
 pub mod measured_board;
+pub mod neighbor_noise;
 pub mod stage_axis;
-
+mod suspect_words;
+pub mod suspects;
 pub mod verdict;
 pub mod working_volume;
 

@@ -1,6 +1,9 @@
 //! Pass, doubtful or fail, with reasons: every figure next to its threshold.
 
+use super::agreement::{Agreement, Ratio};
 use super::cause::Cause;
+pub use super::grade::Grade;
+use super::half_data::{HalfData, Split};
 use serde::{Deserialize, Serialize};
 
 /// The judgement with its reasons.
@@ -12,72 +15,41 @@ pub struct Verdict {
     pub reasons: Vec<String>,
 }
 
-/// Pass, doubtful or fail.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Grade {
-    /// Nothing speaks against it.
-    Pass,
-    /// Usable with care: see the reasons.
-    Doubtful,
-    /// Not usable: see the reasons.
-    Fail,
-}
-
-impl Grade {
-    /// The grade as a word.
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Pass => "pass",
-            Self::Doubtful => "doubtful",
-            Self::Fail => "fail",
-        }
-    }
-}
-
-impl std::fmt::Display for Grade {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.word())
-    }
-}
-
-/// Where a figure stops being good, and where it stops being usable.
+/// Where a figure stops being good, and where it stops being usable. What depends on a rig's geometry,
+/// on the number of corners or on their noise has no limit here: it is judged by what chance leaves.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Thresholds {
     /// Corner noise, px per axis. Sub-pixel detectors reach 0.02 to 0.1 px on sharp images; half a
     /// pixel means blur or a board that is not what the manifest says.
     pub sigma_px: (f64, f64),
-    /// Held-out RMS over the fit's own: 1 is ideal, much more means that the fit followed noise.
-    pub held_out_ratio: (f64, f64),
-    /// RMS error of neighboring corners' distance on held-out boards, percent of the square.
-    pub neighbor_rms_percent: (f64, f64),
-    /// Difference of two calibrations from half of the poses over what it was to be; above it the
-    /// calibration is doubtful. Chance alone leads to 1.5 (see `half_data`); at twice the
-    /// prediction the predicted uncertainty is worth little.
-    pub half_data_ratio: f64,
-    /// Share of corners rejected as outliers.
-    pub rejected_share: (f64, f64),
+    /// Held-out residual over the fitted one: beyond, the calibration is of no use on boards that it
+    /// never saw.
+    pub held_out_ratio: f64,
+    /// Distance error of neighboring corners on held-out boards over what the noise of the corners
+    /// makes of it: at the first, half of the squared error is not noise.
+    pub neighbor_ratio: (f64, f64),
+    /// What the cameras disagree about, over what the calibration leaves open anyway.
+    pub disagreement: f64,
+    /// Share of corners rejected as outliers that is a fail.
+    pub rejected_share: f64,
     /// Share of views that had to be left out, split from their pair or renumbered; above it,
     /// something is wrong with how the recording is made.
     pub suspect_views: f64,
     /// Poses used; below the first is doubtful (few views hold no flexible field), below the
     /// second is a fail.
     pub poses: (usize, usize),
-    /// Share of a sensor that is calibrated; below the first is doubtful.
-    pub covered_share: f64,
 }
 
 impl Default for Thresholds {
     fn default() -> Self {
         Self {
             sigma_px: (0.3, 2.0),
-            held_out_ratio: (1.5, 5.0),
-            neighbor_rms_percent: (1.0, 10.0),
-            half_data_ratio: 2.0,
-            rejected_share: (0.03, 0.3),
-            suspect_views: 0.03,
+            held_out_ratio: 5.0,
+            neighbor_ratio: (2f64.sqrt(), 10.0),
+            disagreement: 2.0,
+            rejected_share: 0.3,
+            suspect_views: 0.1,
             poses: (10, 3),
-            covered_share: 0.5,
         }
     }
 }
@@ -103,86 +75,44 @@ impl Verdict {
 pub struct Figures {
     /// Standard deviation of the corner noise per axis, px.
     pub sigma_px: f64,
-    /// RMS of the residual vectors of the corners used, px.
-    pub rms_px: f64,
-    /// RMS of the residual vectors on held-out boards, px.
-    pub held_out_rms_px: Option<f64>,
-    /// RMS error of neighboring corners' distance on held-out boards, percent.
-    pub neighbor_rms_percent: Option<f64>,
-    /// Difference of two calibrations from half of the poses over what it was to be.
-    pub half_data_ratio: Option<f64>,
+    /// RMS of the residual vectors of all corners, rejected ones too, px per axis.
+    pub all_sigma_px: f64,
+    /// Like with like; `None` without a held-out check.
+    pub agreement: Option<Agreement>,
+    /// What a pixel is at the working distance, mm.
+    pub mm_per_px: f64,
+    /// RMS of what the calibration leaves open of points at the working distance, mm.
+    pub left_open_mm: Option<f64>,
+    /// RMS error of neighboring corners' distance on held-out boards, and what noise makes of it, mm.
+    pub neighbors_mm: Option<(f64, f64)>,
+    /// Halves of the poses that were compared.
+    pub halves: Vec<(Split, HalfData)>,
     /// Corners used and rejected.
     pub corners: (usize, usize),
     /// Views that could not be used as they were recorded, and all views.
     pub suspect_views: (usize, usize),
     /// Poses used.
     pub pose_count: usize,
-    /// Name and calibrated share of the sensor, per camera.
-    pub covered_share: Vec<(String, f64)>,
     /// Whether the adjustment came to rest.
     pub settled: bool,
 }
 
+type Reason = (Grade, String);
+
 /// Judges a calibration.
 pub fn judge(figures: &Figures, thresholds: &Thresholds) -> Verdict {
-    let mut reasons: Vec<(Grade, String)> = Vec::new();
-    let mut above = |name: &str, value: f64, unit: &str, (doubtful, fail): (f64, f64)| {
-        // Written so that NaN fails.
-        let grade = if value <= doubtful {
-            Grade::Pass
-        } else if value <= fail {
-            Grade::Doubtful
-        } else {
-            Grade::Fail
-        };
-        let relation = match grade {
-            Grade::Pass => format!("within {doubtful}{unit}"),
-            Grade::Doubtful => format!("above {doubtful}{unit}"),
-            Grade::Fail => format!("above {fail}{unit}"),
-        };
-        reasons.push((grade, format!("{name} {value:.3}{unit}, {relation}")));
-    };
-    above("corner noise", figures.sigma_px, " px", thresholds.sigma_px);
-    if let Some(held_out) = figures.held_out_rms_px {
-        above(
-            "held-out over fitted residual",
-            held_out / figures.rms_px.max(1e-9),
-            "",
-            thresholds.held_out_ratio,
-        );
-    }
-    if let Some(percent) = figures.neighbor_rms_percent {
-        above(
-            "held-out neighbor distance error",
-            percent,
-            " % of the square",
-            thresholds.neighbor_rms_percent,
-        );
-    }
-    if let Some(ratio) = figures.half_data_ratio {
-        above(
-            "difference of half-data calibrations over the predicted one",
-            ratio,
-            "",
-            (thresholds.half_data_ratio, f64::INFINITY),
-        );
-    }
-    let (used, rejected) = figures.corners;
-    above(
-        "share of corners rejected",
-        100.0 * rejected as f64 / (used + rejected).max(1) as f64,
-        " %",
-        (
-            100.0 * thresholds.rejected_share.0,
-            100.0 * thresholds.rejected_share.1,
-        ),
-    );
-    if figures.held_out_rms_px.is_none() {
-        reasons.push((
+    let mut reasons = vec![noise(figures, thresholds)];
+    match &figures.agreement {
+        Some(agreement) => reasons.extend(like_with_like(agreement, figures, thresholds)),
+        None => reasons.push((
             Grade::Doubtful,
             "too few poses for a held-out check".to_string(),
-        ));
+        )),
     }
+    reasons.extend(figures.neighbors_mm.map(|mm| neighbors(mm, thresholds)));
+    let halves = figures.halves.iter();
+    reasons.extend(halves.map(|(split, half)| half_data(*split, half)));
+    reasons.push(rejected(figures, thresholds));
     let (suspect, views) = figures.suspect_views;
     if suspect as f64 > thresholds.suspect_views * views as f64 {
         reasons.push((
@@ -204,8 +134,6 @@ pub fn judge(figures: &Figures, thresholds: &Thresholds) -> Verdict {
         grade,
         format!("{} poses, {few} or more wanted", figures.pose_count),
     ));
-    let cameras = figures.covered_share.iter();
-    reasons.extend(cameras.map(|(name, share)| coverage(name, *share, thresholds.covered_share)));
     if !figures.settled {
         reasons.push((
             Grade::Doubtful,
@@ -223,36 +151,178 @@ pub fn judge(figures: &Figures, thresholds: &Thresholds) -> Verdict {
     }
 }
 
-fn coverage(camera: &str, share: f64, wanted: f64) -> (Grade, String) {
-    let grade = if share >= wanted {
+/// The grade of a value by two limits; NaN fails.
+fn above(value: f64, (doubtful, fail): (f64, f64)) -> Grade {
+    if value <= doubtful {
         Grade::Pass
-    } else {
+    } else if value <= fail {
         Grade::Doubtful
+    } else {
+        Grade::Fail
+    }
+}
+
+fn noise(figures: &Figures, thresholds: &Thresholds) -> Reason {
+    let (doubtful, fail) = thresholds.sigma_px;
+    let grade = above(figures.sigma_px, thresholds.sigma_px);
+    let relation = match grade {
+        Grade::Pass => format!("within {doubtful} px"),
+        Grade::Doubtful => format!("above {doubtful} px"),
+        Grade::Fail => format!("above {fail} px"),
     };
-    let reason = format!(
-        "camera {camera}: corners cover {:.0} % of the sensor, {:.0} % or more wanted",
-        100.0 * share,
-        100.0 * wanted
+    let text = format!(
+        "corner noise {:.3} px, {:.3} mm at the working distance, {relation}",
+        figures.sigma_px,
+        figures.sigma_px * figures.mm_per_px
     );
-    (grade, reason)
+    (grade, text)
+}
+
+/// Residuals of the same corners.
+fn like_with_like(
+    agreement: &Agreement,
+    figures: &Figures,
+    thresholds: &Thresholds,
+) -> Vec<Reason> {
+    let mut reasons = Vec::new();
+    let kinds = [
+        ("a pose for each view", agreement.mono),
+        ("a pose for each board", agreement.stereo),
+    ];
+    for (kind, ratio) in kinds {
+        let Some(found) = ratio else { continue };
+        let grade = if !(found.ratio <= thresholds.held_out_ratio) {
+            Grade::Fail
+        } else if found.is_unlikely() {
+            Grade::Doubtful
+        } else {
+            Grade::Pass
+        };
+        let text = format!(
+            "held-out over fitted residual of the same corners, {kind}: {}",
+            ratio_words(&found, figures.mm_per_px)
+        );
+        reasons.push((grade, text));
+    }
+    if let Some(found) = agreement.cameras {
+        let mm = agreement.disagreement_px * figures.mm_per_px;
+        let costs = figures
+            .left_open_mm
+            .is_some_and(|open| mm > thresholds.disagreement * open);
+        let grade = if found.is_unlikely() && costs {
+            Grade::Doubtful
+        } else {
+            Grade::Pass
+        };
+        let text = format!(
+            "cameras about where boards are (one pose for all over one for each): {}",
+            ratio_words(&found, figures.mm_per_px)
+        );
+        reasons.push((grade, text));
+    }
+    reasons
+}
+
+fn ratio_words(found: &Ratio, mm_per_px: f64) -> String {
+    let [low, high] = found.by_chance;
+    format!(
+        "{:.3}, {low:.3} to {high:.3} by chance ({:.3} px, {:.3} mm)",
+        found.ratio,
+        found.rms_px,
+        found.rms_px * mm_per_px
+    )
+}
+
+fn neighbors((found_mm, noise_mm): (f64, f64), thresholds: &Thresholds) -> Reason {
+    let ratio = found_mm / noise_mm;
+    let text = format!(
+        "held-out neighbor distance error {found_mm:.4} mm, {ratio:.2} of what the corners' noise \
+         makes of it, {:.2} allowed",
+        thresholds.neighbor_ratio.0
+    );
+    (above(ratio, thresholds.neighbor_ratio), text)
+}
+
+fn half_data(split: Split, half: &HalfData) -> Reason {
+    let [_, high] = half.ratio_by_chance;
+    let figures = format!(
+        "{}: calibrations differ by {:.4} mm RMS, {:.2} of the predicted, up to {high:.2} by chance",
+        split.word(),
+        half.difference_rms_mm,
+        half.ratio
+    );
+    if half.is_larger() {
+        (Grade::Doubtful, figures)
+    } else if half.shows_nothing() {
+        (Grade::Pass, format!("{figures}, which shows nothing"))
+    } else {
+        (Grade::Pass, figures)
+    }
+}
+
+/// Outliers cost what they would as errors of a measurement.
+fn rejected(figures: &Figures, thresholds: &Thresholds) -> Reason {
+    let (used, rejected) = figures.corners;
+    let share = rejected as f64 / (used + rejected).max(1) as f64;
+    let limit_px = thresholds.sigma_px.0;
+    let grade = if share > thresholds.rejected_share {
+        Grade::Fail
+    } else if rejected > 0 && figures.all_sigma_px > limit_px {
+        Grade::Doubtful
+    } else {
+        Grade::Pass
+    };
+    let text = format!(
+        "{:.3} % of corners rejected; with them the residual is {:.3} px per axis, {limit_px} px allowed",
+        100.0 * share,
+        figures.all_sigma_px
+    );
+    (grade, text)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn ratio(ratio: f64) -> Option<Ratio> {
+        Some(Ratio {
+            rms_px: 0.07 * ratio,
+            beside_px: 0.07,
+            ratio,
+            by_chance: [1.0, 1.04],
+        })
+    }
+
     fn good() -> Figures {
         Figures {
             sigma_px: 0.05,
-            rms_px: 0.07,
-            held_out_rms_px: Some(0.072),
-            neighbor_rms_percent: Some(0.1),
-            half_data_ratio: Some(1.3),
+            all_sigma_px: 0.06,
+            agreement: Some(Agreement {
+                mono: ratio(1.02),
+                stereo: ratio(1.02),
+                cameras: ratio(1.02),
+                disagreement_px: 0.0,
+            }),
+            mm_per_px: 0.3,
+            left_open_mm: Some(0.007),
+            neighbors_mm: Some((0.02, 0.02)),
+            halves: vec![(Split::InTurn, half(1.3))],
             corners: (5000, 10),
             suspect_views: (1, 68),
             pose_count: 34,
-            covered_share: vec![("left".into(), 0.9)],
             settled: true,
+        }
+    }
+
+    fn half(ratio: f64) -> HalfData {
+        HalfData {
+            poses: [17, 17],
+            points: 100,
+            difference_rms_mm: 0.01 * ratio,
+            predicted_rms_mm: 0.01,
+            ratio,
+            modes: 10.0,
+            ratio_by_chance: [0.4, 1.7],
         }
     }
 
@@ -263,15 +333,33 @@ mod tests {
     fn good_figures_pass_and_each_bad_one_lowers_the_grade() {
         let thresholds = Thresholds::default();
         assert_eq!(judge(&good(), &thresholds).grade, Grade::Pass);
-        let cases: [(Spoil, Grade); 8] = [
-            (|f| f.half_data_ratio = Some(2.5), Grade::Doubtful),
+        let cases: [(Spoil, Grade); 12] = [
+            (|f| f.halves[0].1 = half(1.8), Grade::Doubtful),
             (|f| f.suspect_views = (11, 68), Grade::Doubtful),
             (|f| f.sigma_px = 0.4, Grade::Doubtful),
             (|f| f.sigma_px = f64::NAN, Grade::Fail),
-            (|f| f.held_out_rms_px = Some(0.5), Grade::Fail),
-            (|f| f.corners = (900, 100), Grade::Doubtful),
+            (|f| f.agreement = None, Grade::Doubtful),
+            (
+                |f| f.agreement.iter_mut().for_each(|a| a.mono = ratio(6.0)),
+                Grade::Fail,
+            ),
+            (
+                |f| f.agreement.iter_mut().for_each(|a| a.stereo = ratio(0.9)),
+                Grade::Doubtful,
+            ),
+            (
+                |f| {
+                    f.agreement.iter_mut().for_each(|a| {
+                        a.cameras = ratio(1.5);
+                        a.disagreement_px = 0.08;
+                    });
+                },
+                Grade::Doubtful,
+            ),
+            (|f| f.neighbors_mm = Some((0.03, 0.02)), Grade::Doubtful),
+            (|f| f.corners = (500, 500), Grade::Fail),
+            (|f| f.all_sigma_px = 0.5, Grade::Doubtful),
             (|f| f.pose_count = 5, Grade::Doubtful),
-            (|f| f.covered_share[0].1 = 0.2, Grade::Doubtful),
         ];
         for (spoil, expected) in cases {
             let mut figures = good();

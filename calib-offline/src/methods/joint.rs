@@ -6,8 +6,11 @@ use crate::report::record::ChoicesRecord;
 use calib_estimate::adjust::Observations;
 use calib_estimate::init::rig::start_rig;
 use calib_estimate::joint::{Estimate, EstimateError, estimate, estimate_screened};
+use calib_judge::half_data::Split;
 use calib_judge::held_out::Estimated;
-use calib_judge::{CrossChecks, cross_check};
+use calib_judge::suspects::{left_open_mm, suspects};
+use calib_judge::working_volume::span;
+use calib_judge::{Cause, CrossChecks, cross_check};
 use calib_rays::field::Rig;
 use calib_rays::progress::Progress;
 use std::collections::BTreeSet;
@@ -73,8 +76,21 @@ impl Method for Joint {
 }
 
 impl Own for Estimate {
-    fn check(&self, rig: &Rig, first_half: Option<&BTreeSet<usize>>) -> Option<CrossChecks> {
-        Some(cross_check(self, rig, first_half))
+    fn check(&self, rig: &Rig, splits: &[(Split, BTreeSet<usize>)]) -> Option<CrossChecks> {
+        Some(cross_check(self, rig, splits))
+    }
+
+    fn freedom(&self) -> f64 {
+        Self::freedom(self)
+    }
+
+    fn left_open_mm(&self, rig: &Rig) -> Option<f64> {
+        let distances = span(&self.board_distances_mm(rig));
+        left_open_mm(&mut self.clone(), rig, &distances)
+    }
+
+    fn suspects(&self, rig: &Rig) -> Vec<Cause> {
+        suspects(self, rig)
     }
 }
 

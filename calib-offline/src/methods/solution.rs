@@ -4,12 +4,14 @@ use crate::report::record::{AlternatingRecord, ChoicesRecord};
 use calib_estimate::adjust::robust::{StudentT, relative_weights, reweight};
 use calib_estimate::adjust::{Observations, StopReason};
 use calib_estimate::init::screening::Finding;
-use calib_judge::CrossChecks;
+use calib_judge::half_data::Split;
 use calib_judge::known_points::{Points, measure};
+use calib_judge::{Cause, CrossChecks};
 use calib_rays::board::BoardShape;
 use calib_rays::field::{RayTable, Rig};
 use calib_rays::geometry::{RigidTransform, SensorSize};
 use calib_rays::measure::{PointSource, RigSource, Sighting};
+use calib_rays::numerics::median;
 use nalgebra::Vector2;
 use std::collections::BTreeSet;
 use std::fmt::Debug;
@@ -66,10 +68,26 @@ pub trait Own: Debug + Send + Sync {
         None
     }
 
-    /// Checks of the calibration against itself; `rig` is that of the solution, `first_half` has the
-    /// poses of one half, `None` if halves are not to be compared.
-    fn check(&self, _rig: &Rig, _first_half: Option<&BTreeSet<usize>>) -> Option<CrossChecks> {
+    /// Checks of the calibration against itself; `rig` is that of the solution, `splits` are the ways to
+    /// halve its poses, none if halves are not to be compared.
+    fn check(&self, _rig: &Rig, _splits: &[(Split, BTreeSet<usize>)]) -> Option<CrossChecks> {
         None
+    }
+
+    /// Numbers that the data determine, poses apart; 0 if that is not known.
+    fn freedom(&self) -> f64 {
+        0.0
+    }
+
+    /// RMS of what it leaves open of points at its working distance, mm; `rig` is that of the solution.
+    fn left_open_mm(&self, _rig: &Rig) -> Option<f64> {
+        None
+    }
+
+    /// What explains its residuals better than noise, most important first; `rig` is that of the
+    /// solution.
+    fn suspects(&self, _rig: &Rig) -> Vec<Cause> {
+        Vec::new()
     }
 }
 
@@ -84,6 +102,19 @@ impl Solution {
             || vec![None; matches.len()],
             |source| measure(&source, matches),
         )
+    }
+
+    /// What a pixel in the middle of the first camera is at the median distance of its boards, mm.
+    pub fn mm_per_px(&self) -> f64 {
+        let Some(camera) = self.rig.cameras.first() else {
+            return 0.0;
+        };
+        let middle = self.observations.board.center_in_board();
+        let place = camera.rig_from_camera.translation_mm;
+        let poses = self.rig_from_board.iter();
+        let distance_mm = median(poses.map(|pose| (pose.point(&middle) - place).norm()));
+        let sample = camera.field.sample(camera.field.sensor.center());
+        distance_mm.unwrap_or(0.0) * sample.ds.determinant().abs().sqrt()
     }
 
     /// Number of different poses that went in; one that was split counts once.

@@ -3,6 +3,7 @@
 use super::Corners;
 use crate::methods::Solution;
 use calib_estimate::adjust::Observations;
+use calib_judge::agreement::Agreement;
 use calib_judge::verdict::Thresholds;
 use calib_judge::{Cause, CrossChecks, HeldOut};
 use calib_recording::dataset::Dataset;
@@ -19,6 +20,12 @@ pub struct Parts<'a> {
     pub solution: &'a Solution,
     /// The check on unseen boards.
     pub held_out: &'a HeldOut,
+    /// Residuals of the same corners by the whole and by the folds.
+    pub agreement: Agreement,
+    /// What a pixel of the first camera is at the working distance, mm.
+    pub mm_per_px: f64,
+    /// RMS of what the calibration leaves open of points at the working distance, mm.
+    pub left_open_mm: Option<f64>,
     /// Checks of the calibration against itself, where the method has them.
     pub checks: Option<&'a CrossChecks>,
     /// What was found about the recording, most likely first.

@@ -6,9 +6,9 @@ use crate::methods::solution::Solution;
 use crate::report::record::{
     Calibration, CornerRecord, EstimateRecord, HeldOutRecord, PoseRecord, SCHEMA, StageAxis,
 };
-use calib_judge::half_data::HalfDataCheck;
+use calib_judge::neighbor_noise::neighbor_noise_mm;
 use calib_judge::verdict::{Figures, judge};
-use calib_judge::{CrossChecks, HeldOut, fit_stage_axes};
+use calib_judge::{HeldOut, fit_stage_axes};
 use calib_rays::numerics::rms;
 use calib_recording::dataset::identity::input_sha256;
 use calib_recording::dataset::stage;
@@ -27,27 +27,8 @@ pub fn record(parts: &Parts) -> Calibration {
     let corners = corner_records(solution);
     let poses = pose_records(parts, rig.cameras.len());
     let summary = estimate_record(solution, &corners);
-    let held_out = held_out_record(parts.held_out);
-    let verdict = judge(
-        &Figures {
-            sigma_px: summary.sigma_px,
-            rms_px: summary.rms_px,
-            held_out_rms_px: held_out.as_ref().and_then(|h| h.rms_px),
-            neighbor_rms_percent: held_out.as_ref().and_then(|h| h.neighbor_rms_percent),
-            half_data_ratio: parts.checks.and_then(half_data_ratio),
-            corners: (summary.corners_used, summary.corners_rejected),
-            suspect_views: (solution.findings.len(), parts.observations.views.len()),
-            pose_count: solution.pose_count(),
-            covered_share: rig
-                .cameras
-                .iter()
-                .map(|c| (c.name.clone(), c.coverage.covered_share()))
-                .collect(),
-            settled: solution.settled,
-        },
-        parts.thresholds,
-    )
-    .with_causes(parts.causes);
+    let held_out = held_out_record(parts);
+    let verdict = judge(&figures(parts, &summary), parts.thresholds).with_causes(parts.causes);
     Calibration {
         schema: SCHEMA.to_string(),
         tool_version: env!("CARGO_PKG_VERSION").to_string(),
@@ -71,10 +52,32 @@ pub fn record(parts: &Parts) -> Calibration {
     }
 }
 
-fn half_data_ratio(checks: &CrossChecks) -> Option<f64> {
-    match &checks.half_data {
-        HalfDataCheck::Compared(halves) => Some(halves.ratio),
-        HalfDataCheck::Skipped(_) => None,
+/// What the verdict judges.
+fn figures(parts: &Parts, summary: &EstimateRecord) -> Figures {
+    let solution = parts.solution;
+    let rig = &solution.rig;
+    let residuals = solution.residuals.iter().flatten().flatten();
+    let all: Vec<f64> = residuals.map(nalgebra::Matrix::norm).collect();
+    let sigma_px = summary.rms_px / 2f64.sqrt();
+    let neighbors_mm = rms(&parts.held_out.boards.neighbor_errors)
+        .map(|error| error * parts.dataset.board.square_mm)
+        .zip(neighbor_noise_mm(rig, &solution.observations, sigma_px));
+    let halves = parts
+        .checks
+        .iter()
+        .flat_map(|checks| checks.compared_halves());
+    Figures {
+        sigma_px: summary.sigma_px,
+        all_sigma_px: rms(&all).unwrap_or(0.0) / 2f64.sqrt(),
+        agreement: (parts.held_out.folds > 0).then_some(parts.agreement),
+        mm_per_px: parts.mm_per_px,
+        left_open_mm: parts.left_open_mm,
+        neighbors_mm,
+        halves: halves.map(|(split, half)| (split, *half)).collect(),
+        corners: (summary.corners_used, summary.corners_rejected),
+        suspect_views: (solution.findings.len(), parts.observations.views.len()),
+        pose_count: solution.pose_count(),
+        settled: solution.settled,
     }
 }
 
@@ -119,7 +122,8 @@ fn estimate_record(solution: &Solution, corners: &[CornerRecord]) -> EstimateRec
     }
 }
 
-fn held_out_record(held_out: &HeldOut) -> Option<HeldOutRecord> {
+fn held_out_record(parts: &Parts) -> Option<HeldOutRecord> {
+    let held_out: &HeldOut = parts.held_out;
     if held_out.folds == 0 {
         return None;
     }
@@ -135,6 +139,7 @@ fn held_out_record(held_out: &HeldOut) -> Option<HeldOutRecord> {
         rigid_rms_mm: rms(&held_out.boards.rigid_errors_mm),
         point_count: held_out.boards.point_count,
         outside_count: held_out.outside_count,
+        agreement: Some(parts.agreement),
     })
 }
 

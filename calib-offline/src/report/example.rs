@@ -191,6 +191,7 @@ fn held_out() -> HeldOutRecord {
         rigid_rms_mm: Some(0.0113),
         point_count: 5872,
         outside_count: 41,
+        agreement: None,
     }
 }
 
@@ -231,6 +232,7 @@ fn choices() -> ChoicesRecord {
 fn checks() -> CrossChecks {
     let cameras = [(0.082, 0.39, Some([0.0793, 0.0818])), (0.0, 0.0, None)];
     CrossChecks {
+        other_halves: Vec::new(),
         centrality: cameras
             .map(|(rms_mm, max_mm, halves_rms_mm)| Centrality {
                 central: rms_mm == 0.0,

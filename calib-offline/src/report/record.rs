@@ -3,6 +3,7 @@
 use calib_estimate::alternating::estimate::{PlacementCircles, StartCost};
 use calib_estimate::alternating::spread::SpreadChoice;
 use calib_estimate::joint::{Choice, SmoothnessFound};
+pub use calib_judge::agreement::Agreement;
 pub use calib_judge::held_out::FailedFold;
 pub use calib_judge::stage_axis::StageAxis;
 pub use calib_judge::verdict::{Grade, Verdict};
@@ -212,4 +213,8 @@ pub struct HeldOutRecord {
     pub point_count: usize,
     /// Held-out corners outside the calibrated area of their fold, for which nothing was measured.
     pub outside_count: usize,
+    /// Residuals of the same corners, held-out and fitted, and whether the cameras agree; `None` in
+    /// files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub agreement: Option<Agreement>,
 }

@@ -67,7 +67,7 @@ fn few_poses_are_not_halved() {
         checked(&few, &estimate).half_data,
         HalfDataCheck::Skipped(Skipped::TooFewPoses { have: 8, need: 10 })
     );
-    let unasked = cross_check(&estimate, &estimate.rig(&names()), None);
+    let unasked = cross_check(&estimate, &estimate.rig(&names()), &[]);
     assert_eq!(
         unasked.half_data,
         HalfDataCheck::Skipped(Skipped::NotWanted)

@@ -130,6 +130,46 @@ pub fn residuals_with_free_pose(
     Some(rows.into_iter().map(|row| row.residual_px).collect())
 }
 
+/// Residual vectors (observed minus predicted, px) of a board seen by several cameras, given with the
+/// places of the cameras, with one pose for all, least squares; `None` if the corners place no board.
+pub fn residuals_with_one_pose(
+    views: &[(&RayField, RigidTransform, &[Corner])],
+    board: &BoardSpec,
+    shape: &BoardShape,
+) -> Option<Vec<Vec<Vector2<f64>>>> {
+    let seen: Vec<(SeenBoard, RigidTransform)> = views
+        .iter()
+        .map(|(field, camera_from_rig, corners)| {
+            let places = corners
+                .iter()
+                .map(|c| (c.pixel, board.corner_in_board(c.row, c.col)));
+            (
+                SeenBoard::new(field, board, shape, places),
+                *camera_from_rig,
+            )
+        })
+        .collect();
+    let (first, camera_from_rig) = seen.first()?;
+    let mut rig_from_board = camera_from_rig.inverse() * first.start()?;
+    let rows = |pose: &RigidTransform| -> Option<Vec<Vec<Row>>> {
+        let rows = seen
+            .iter()
+            .map(|(seen, place)| seen.rows_in_rig(pose, place));
+        rows.collect()
+    };
+    for _ in 0..PLAIN_STEPS {
+        let flat: Vec<Row> = rows(&rig_from_board)?.into_iter().flatten().collect();
+        let equations = Equations::of(&flat, std::iter::repeat(1.0));
+        let change = equations
+            .information
+            .cholesky()?
+            .solve(&-equations.gradient);
+        rig_from_board = rig_from_board.stepped(&change);
+    }
+    let residuals = |rows: Vec<Row>| rows.into_iter().map(|row| row.residual_px).collect();
+    Some(rows(&rig_from_board)?.into_iter().map(residuals).collect())
+}
+
 /// The corners of a view: what the field gives to each pixel, and where each is on the bent board.
 struct SeenBoard {
     samples: Vec<FieldSample>,
@@ -165,12 +205,23 @@ impl SeenBoard {
 
     /// Each corner's residual and its derivative; `None` if a corner lies behind the camera.
     fn rows(&self, camera_from_board: &RigidTransform) -> Option<Vec<Row>> {
+        self.rows_in_rig(camera_from_board, &RigidTransform::identity())
+    }
+
+    /// The same of a board placed in the rig's frame, by its pose there.
+    fn rows_in_rig(
+        &self,
+        rig_from_board: &RigidTransform,
+        camera_from_rig: &RigidTransform,
+    ) -> Option<Vec<Row>> {
         let row = |(sample, point): (&FieldSample, &Vector3<f64>)| {
-            let turned = camera_from_board.rotation * point;
-            let l = linearize(sample, &(turned + camera_from_board.translation_mm))?;
+            let turned = rig_from_board.rotation * point;
+            let in_rig = turned + rig_from_board.translation_mm;
+            let l = linearize(sample, &camera_from_rig.point(&in_rig))?;
+            let by_rig = l.by_point * camera_from_rig.rotation;
             Some(Row {
                 residual_px: l.residual_px,
-                by_pose: RigidTransform::by_step(&l.by_point, &turned),
+                by_pose: RigidTransform::by_step(&by_rig, &turned),
             })
         };
         self.samples

@@ -303,7 +303,8 @@ impl Search<'_> {
     }
 }
 
-fn add_offsets(model: &mut Model) {
+/// Gives every camera an offset.
+pub fn add_offsets(model: &mut Model) {
     for camera in &mut model.cameras {
         camera.free_offset(OFFSET_DEGREE);
     }

@@ -58,7 +58,7 @@ pub struct Estimate {
     /// Why the last adjustment ended.
     pub stop: StopReason,
     /// The fit behind it all.
-    pub(super) fit: Fit,
+    pub(crate) fit: Fit,
 }
 
 /// Estimates everything from a start.

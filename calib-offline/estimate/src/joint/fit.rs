@@ -78,13 +78,34 @@ impl Fit {
         next
     }
 
+    /// The same fit of changed observations of the same views.
+    pub fn on(&self, observations: &Observations) -> Self {
+        let bases = self.model.view_bases(observations);
+        let residuals = objective::residuals(&self.model, observations, &bases);
+        Self {
+            bases,
+            residuals,
+            ..self.clone()
+        }
+    }
+
+    /// Number of parameters that the data determine.
+    pub fn effective_parameters(&self) -> f64 {
+        self.effective_parameters
+    }
+
+    /// The values of the fixed functions at every corner, per view.
+    pub fn bases(&self) -> &[ViewBasis] {
+        &self.bases
+    }
+
     /// Observed minus predicted, px, per view and corner.
     pub fn residuals(&self) -> &[Vec<Option<Vector2<f64>>>] {
         &self.residuals
     }
 
     /// Weights from the residuals as they are, and the noise that they show.
-    fn reweight(&mut self, observations: &Observations) -> Weights {
+    pub fn reweight(&mut self, observations: &Observations) -> Weights {
         let freedom = self.freedom(observations);
         let (noise, weights) = reweight(
             &self.residuals,
@@ -127,7 +148,8 @@ impl Fit {
         }
     }
 
-    fn priors(&self) -> Priors {
+    /// The priors that go with the smoothness.
+    pub fn priors(&self) -> Priors {
         self.smoothness
             .priors(&self.model, 1.0 / (BOARD_SHAPE_SD_MM * BOARD_SHAPE_SD_MM))
     }

@@ -62,7 +62,13 @@ impl Estimate {
         })
     }
 
-    fn remade(&self, fit: Fit, observations: Observations) -> Self {
+    /// Numbers that the data determine, poses apart.
+    pub fn freedom(&self) -> f64 {
+        self.fit.effective_parameters() - 6.0 * self.observations.poses.len() as f64
+    }
+
+    /// The estimate with another fit, of the same choices.
+    pub(crate) fn remade(&self, fit: Fit, observations: Observations) -> Self {
         let choices = self.choices.clone();
         finish(fit, observations, self.neighbor_correlation, choices)
     }

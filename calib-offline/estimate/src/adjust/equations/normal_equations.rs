@@ -332,7 +332,10 @@ fn border_columns(
 
 /// Where extrinsics and board shape stand among the global parameters, in the order of a view's
 /// small columns behind the pose; `None` for extrinsics that are held.
-fn fixed_columns(layout: &Layout, camera_idx: usize) -> impl Iterator<Item = Option<usize>> + '_ {
+pub(super) fn fixed_columns(
+    layout: &Layout,
+    camera_idx: usize,
+) -> impl Iterator<Item = Option<usize>> + '_ {
     let extrinsics = layout.cameras[camera_idx].extrinsics.as_ref();
     (0..6)
         .map(move |k| extrinsics.map(|range| range.start + k))
