@@ -24,10 +24,8 @@ pub const MAX_CAMERAS: u16 = 64;
 /// Largest magnitude of any number in a table, mm or ratio: products of a few stay finite in f32.
 pub const MAX_MAGNITUDE: f32 = 1e6;
 
-/// One 1 KiB table on a device; sixteen, which take sixteen bytes at a time, where there is memory.
-type Tables = Table<{ if cfg!(target_os = "none") { 1 } else { 16 } }>;
-/// CRC-32/ISO-HDLC, the one of zlib and of Ethernet.
-static CRC: Crc<u32, Tables> = Crc::<u32, Tables>::new(&CRC_32_ISO_HDLC);
+/// CRC-32/ISO-HDLC, the one of zlib and of Ethernet; one 1 KiB table.
+static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
 /// Where the checksum stands in the header.
 pub const CRC_OFFSET: usize = 12;
