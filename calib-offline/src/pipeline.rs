@@ -44,6 +44,8 @@ pub struct CalibrateSettings {
     pub detect: DetectSettings,
     /// Whether a table with one ray per pixel is made of every camera.
     pub ray_tables: bool,
+    /// How noisy the pixels of matches will be, px, if somebody knows: for predictions only.
+    pub match_noise_px: Option<f64>,
 }
 
 impl Default for CalibrateSettings {
@@ -54,6 +56,7 @@ impl Default for CalibrateSettings {
             thresholds: Thresholds::default(),
             detect: DetectSettings::default(),
             ray_tables: false,
+            match_noise_px: None,
         }
     }
 }
@@ -105,6 +108,7 @@ pub fn calibrate(
     let corners = corners(dataset, &settings.detect, progress)?;
     let checked = calibrate_corners(dataset, &corners, settings, progress)?;
     let mut calibrated = Calibrated::from(checked.calibration);
+    calibrated.calibration.rig.match_noise_px = settings.match_noise_px;
     if settings.ray_tables {
         let cameras = &calibrated.calibration.rig.cameras;
         progress.begin("ray tables", cameras.len());

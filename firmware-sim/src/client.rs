@@ -13,9 +13,11 @@ use std::time::{Duration, Instant};
 
 use ray_device::frame::{DELIMITER, FrameReader, FrameWriter, NO_SEQUENCE, Received, Rejected};
 use ray_device::protocol::{
-    Hello, MAX_MATCHES, Match, Measured, Refusal, Reply, Request, SelfTestReport, Status,
-    StoredBlob,
+    Hello, MAX_MATCHES, Match, Measured, NoisyMatches, Refusal, Reply, Request, SelfTestReport,
+    Status, StoredBlob,
 };
+
+use ray_runtime::MatchNoise;
 
 pub use error::ClientError;
 pub use flash::{Begun, FlashOptions, FlashProgress, Flashed};
@@ -183,6 +185,31 @@ impl DeviceClient {
     /// [`ClientError`]; [`Refusal::NoBlob`] inside it if the device has nothing to measure with. A
     /// match that the device cannot triangulate is no error here but an outcome of its own.
     pub fn measure(&mut self, matches: &[Match]) -> Result<Vec<Measured>, ClientError> {
+        self.measure_batches(matches, Request::Measure)
+    }
+
+    /// [`DeviceClient::measure`] of pixels that are as noisy as `noise`, whatever the blob says of them.
+    ///
+    /// # Errors
+    /// As for `measure`; [`Refusal::UnknownMessage`] inside it if the device is too old for this.
+    pub fn measure_noisy(
+        &mut self,
+        matches: &[Match],
+        noise: MatchNoise,
+    ) -> Result<Vec<Measured>, ClientError> {
+        self.measure_batches(matches, |matches| {
+            Request::MeasureNoisy(NoisyMatches {
+                noise_px: noise.px(),
+                matches,
+            })
+        })
+    }
+
+    fn measure_batches(
+        &mut self,
+        matches: &[Match],
+        request: impl Fn(heapless::Vec<Match, MAX_MATCHES>) -> Request,
+    ) -> Result<Vec<Measured>, ClientError> {
         let mut measured = Vec::with_capacity(matches.len());
         let batch_length = usize::from(self.greeting.max_matches).clamp(1, MAX_MATCHES);
         let window = self.window();
@@ -193,7 +220,7 @@ impl DeviceClient {
                 && let Some(batch) = batches.next()
             {
                 let batch_on_wire = batch.iter().copied().collect();
-                under_way.push_back((self.send(&Request::Measure(batch_on_wire))?, batch));
+                under_way.push_back((self.send(&request(batch_on_wire))?, batch));
             }
             let Some((sequence, batch)) = under_way.pop_front() else {
                 break;

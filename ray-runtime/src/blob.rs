@@ -3,14 +3,15 @@
 use crate::camera::Camera;
 use crate::camera_check::CameraCheck;
 use crate::check::{
-    check_padding, check_pairs, check_self_tests, checked_header, is_region_on_sensor,
-    recognized_header,
+    check_padding, check_pairs, check_sections, check_self_tests, checked_header,
+    is_region_on_sensor, recognized_header,
 };
 use crate::format::{
     self, ALIGNMENT, CameraMeta, HEADER_LEN, IDENTITY_LEN, Messages, PairHeader, RECORD_LEN,
     RECORD_WORDS, Record,
 };
 use crate::lookup::Views;
+use crate::match_noise::MatchNoise;
 use crate::self_test::SelfTests;
 use crate::triangulate::{self, Triangulation};
 use crate::uncertainty::{Measurement, Pair};
@@ -31,6 +32,7 @@ pub struct RayBlob<'a> {
     self_tests: Messages<'a>,
     self_test_count: u16,
     pair_bytes: &'a [u8],
+    match_noise: Option<MatchNoise>,
     max_error_px: f32,
     working_distance_mm: f32,
 }
@@ -77,6 +79,7 @@ impl<'a> RayBlob<'a> {
             self_tests: Messages { rest: &[] },
             self_test_count: meta.self_test_count,
             pair_bytes: &[],
+            match_noise: None,
             max_error_px: meta.max_error_px,
             working_distance_mm: meta.working_distance_mm,
         };
@@ -85,11 +88,13 @@ impl<'a> RayBlob<'a> {
             return Err(OpenError::BadMeta);
         }
         let (self_tests, pairs_start) = blob.check_cameras(tables_start, header.version)?;
-        let pair_bytes = bytes.get(pairs_start..).ok_or(OpenError::BadHeader)?;
-        check_pairs(bytes, pairs_start, header.pair_count, header.camera_count)?;
+        let pairs_end = check_pairs(bytes, pairs_start, header.pair_count, header.camera_count)?;
+        let pair_bytes = bytes.get(pairs_start..pairs_end);
+        let known = check_sections(bytes, pairs_end, header.version)?;
         let blob = Self {
             self_tests,
-            pair_bytes,
+            pair_bytes: pair_bytes.ok_or(OpenError::BadHeader)?,
+            match_noise: known.match_noise,
             ..blob
         };
         check_self_tests(
@@ -154,6 +159,12 @@ impl<'a> RayBlob<'a> {
         self.working_distance_mm
     }
 
+    /// How noisy the pixels of matches are, if the blob says so; else they are taken to be as exact as the
+    /// corners of the calibration.
+    pub const fn match_noise(&self) -> Option<MatchNoise> {
+        self.match_noise
+    }
+
     /// Length of the blob, bytes.
     pub const fn len(&self) -> usize {
         self.views.bytes.len()
@@ -206,7 +217,7 @@ impl<'a> RayBlob<'a> {
     }
 
     /// [`RayBlob::triangulate`] with the covariance of the point, rig frame. The cameras may come in
-    /// either order.
+    /// either order. The pixels are taken to be as noisy as [`match_noise`](Self::match_noise) says.
     ///
     /// The point's bits are those of `triangulate`. It costs about four of them, as the
     /// rays are looked up with their derivatives. Whoever does not call it has none of it linked but
@@ -218,6 +229,31 @@ impl<'a> RayBlob<'a> {
         &self,
         a: (usize, PixelPoint),
         b: (usize, PixelPoint),
+    ) -> Result<Measurement, MeasureError> {
+        self.measure(a, b, self.match_noise)
+    }
+
+    /// [`RayBlob::triangulate_with_covariance`] of pixels that are as noisy as `noise`, whatever the blob
+    /// says of them.
+    ///
+    /// # Errors
+    /// Those of `triangulate`.
+    pub fn triangulate_with_noise(
+        &self,
+        a: (usize, PixelPoint),
+        b: (usize, PixelPoint),
+        noise: MatchNoise,
+    ) -> Result<Measurement, MeasureError> {
+        self.measure(a, b, Some(noise))
+    }
+
+    /// `noise` is that of the calibration's corners where it is none.
+    #[inline(never)]
+    fn measure(
+        &self,
+        a: (usize, PixelPoint),
+        b: (usize, PixelPoint),
+        noise: Option<MatchNoise>,
     ) -> Result<Measurement, MeasureError> {
         let (ray_a, ray_b) = (self.moving_sighting(a)?, self.moving_sighting(b)?);
         let meeting = triangulate::meet(&ray_a.ray, &ray_b.ray)?;
@@ -238,6 +274,7 @@ impl<'a> RayBlob<'a> {
                 // Of the other sign with the cameras in the other order, as squares alone are taken.
                 meeting.gap_by_pixels(&by_first, &by_second),
                 meeting.gap_scale(),
+                noise,
             )
         });
         Ok(Measurement {

@@ -3,8 +3,9 @@
 use crate::OpenError;
 use crate::format::{
     self, ALIGNMENT, Axis, CameraMeta, HEADER_LEN, Header, MAGIC, MAX_CAMERAS, MAX_EXTENT_PX,
-    Messages, OLDEST_VERSION, SelfTest, VERSION,
+    MAX_SECTIONS, Messages, OLDEST_VERSION, SECTIONS_SINCE, Section, SelfTest, VERSION, tag,
 };
+use crate::match_noise::MatchNoise;
 use crate::uncertainty::Pair;
 
 /// The header, if magic and version are right.
@@ -67,13 +68,13 @@ pub(crate) fn check_padding(bytes: &[u8], start: usize, end: usize) -> Result<()
         .ok_or(OpenError::BadPadding { at: start as u32 })
 }
 
-/// Checks that there are as many pairs as stated from `start` to the end of the blob, in order.
+/// Checks that there are as many pairs as stated from `start` on, in order; where they end.
 pub(crate) fn check_pairs(
     bytes: &[u8],
     start: usize,
     count: u16,
     camera_count: u16,
-) -> Result<(), OpenError> {
+) -> Result<usize, OpenError> {
     let mut rest = bytes.get(start..).ok_or(OpenError::BadHeader)?;
     let mut last = None;
     for index in 0..count {
@@ -90,11 +91,47 @@ pub(crate) fn check_pairs(
         check_padding(bytes, from.saturating_add(pair.header.section_len()), to)?;
         rest = after;
     }
-    if rest.is_empty() {
-        Ok(())
-    } else {
-        Err(OpenError::BadHeader)
+    Ok(bytes.len().saturating_sub(rest.len()))
+}
+
+/// What sections say that this version knows.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Known {
+    /// Of [`tag::MATCH_NOISE`].
+    pub match_noise: Option<MatchNoise>,
+}
+
+/// Checks the sections from `start` to the end of the blob; what those say that are known.
+#[inline(never)]
+pub(crate) fn check_sections(bytes: &[u8], start: usize, version: u16) -> Result<Known, OpenError> {
+    let mut known = Known { match_noise: None };
+    let mut at = start;
+    let mut last_tag = 0;
+    for index in 0..=MAX_SECTIONS {
+        let rest = bytes.get(at..).unwrap_or_default();
+        if rest.is_empty() {
+            break;
+        }
+        if version < SECTIONS_SINCE {
+            return Err(OpenError::BadHeader);
+        }
+        let bad = OpenError::BadSection { section: index };
+        let (section, behind) = Section::read(rest).ok_or(bad)?;
+        // In ascending order none stands there twice, and none has the tag 0.
+        if index == MAX_SECTIONS || section.header.tag <= last_tag {
+            return Err(bad);
+        }
+        last_tag = section.header.tag;
+        let end = bytes.len().saturating_sub(behind.len());
+        at = format::aligned(end);
+        check_padding(bytes, end, at)?;
+        match section.header.tag {
+            tag::MATCH_NOISE => known.match_noise = Some(section.match_noise().ok_or(bad)?),
+            tag if section.header.is_required => return Err(OpenError::UnknownSection { tag }),
+            _ => {}
+        }
     }
+    Ok(known)
 }
 
 /// Checks that there are as many self-tests as stated, of cameras that exist and of pairs whose

@@ -94,6 +94,16 @@ pub enum OpenError {
         /// Which, in the blob's order.
         pair: u16,
     },
+    /// A section is cut short, out of order, one too many, or says what has no meaning.
+    BadSection {
+        /// Which, in the blob's order.
+        section: u16,
+    },
+    /// A section that must be understood is not known to this version.
+    UnknownSection {
+        /// Its tag.
+        tag: u16,
+    },
 }
 
 impl OpenError {
@@ -113,6 +123,8 @@ impl OpenError {
             Self::BadLayout { .. } => 11,
             Self::BadNumber { .. } => 12,
             Self::BadPair { .. } => 13,
+            Self::BadSection { .. } => 14,
+            Self::UnknownSection { .. } => 15,
         }
     }
 }
@@ -305,8 +317,10 @@ mod tests {
                 table: Table::Mask,
             },
             OpenError::BadPair { pair: 0 },
+            OpenError::BadSection { section: 0 },
+            OpenError::UnknownSection { tag: 2 },
         ];
-        assert!(open.iter().map(|e| e.code()).eq(1..=13));
+        assert!(open.iter().map(|e| e.code()).eq(1..=15));
         assert_eq!(LookupError::Outside.code(), 64);
         assert_eq!(
             LookupError::NoSuchCamera {

@@ -2,7 +2,7 @@
 //! `FORMAT.md` says the same byte by byte.
 //!
 //! ```text
-//! header | metadata (postcard) | pad to 8 | records | tables | pairs
+//! header | metadata (postcard) | pad to 8 | records | tables | pairs | sections
 //! ```
 
 mod axis;
@@ -13,6 +13,7 @@ mod meta;
 mod pair;
 mod quantized;
 mod record;
+mod section;
 
 pub use axis::Axis;
 pub use encoding::{Encoding, Form, PATCH_LEN, coefficient_count};
@@ -30,3 +31,4 @@ pub use quantized::{
 pub(crate) use quantized::{QUANTIZED_HEADER_PAIRS, knots_len};
 pub(crate) use record::is_moderate;
 pub use record::{RECORD_LEN, RECORD_WORDS, Record, RecordFields};
+pub use section::{MAX_SECTIONS, SECTION_HEADER_LEN, SECTIONS_SINCE, Section, SectionHeader, tag};

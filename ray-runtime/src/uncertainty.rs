@@ -10,6 +10,7 @@ use crate::PixelPoint;
 use crate::format::{
     self, MAX_MAGNITUDE, MAX_NODES, MAX_STEP_PX, NODE_LEN, PairHeader, TRIANGLE, is_moderate,
 };
+use crate::match_noise::MatchNoise;
 use crate::triangulate::Triangulation;
 use nalgebra::{Matrix3, Vector3};
 
@@ -19,11 +20,11 @@ pub struct PointCovariance {
     /// From what the calibration leaves uncertain, mm^2. The same for every measurement with the
     /// same pixels: no averaging makes it smaller.
     pub calibration_mm2: Matrix3<f32>,
-    /// From the noise of the measured pixels, if it is that of the calibration's corners, mm^2.
+    /// From the noise of the measured pixels, mm^2.
     pub noise_mm2: Matrix3<f32>,
     /// Variance of the gap with its sign, from both together, mm^2. A gap whose square is often much more
-    /// says that the rig is no longer the calibrated one, or that pixels are off by more than the
-    /// calibration's corners were.
+    /// says that the rig is no longer the calibrated one, or that pixels are noisier than they were taken
+    /// to be.
     pub gap_mm2: f32,
 }
 
@@ -140,13 +141,14 @@ impl<'a> Pair<'a> {
 
     /// The covariance of a point: `by_pixels` says how it moves with the u and v of the pair's
     /// first camera and of its second one, mm/px. `gap_by_pixels` says it of the gap, in units whose
-    /// square is `gap_scale`.
+    /// square is `gap_scale`. Pixels are as noisy as the calibration's corners unless `noise` says other.
     pub fn covariance(
         &self,
         pixel: PixelPoint,
         by_pixels: &[Vector3<f32>; 4],
         gap_by_pixels: [f32; 4],
         gap_scale: f32,
+        noise: Option<MatchNoise>,
     ) -> Option<PointCovariance> {
         let [l11, l21, l22, l31, l32, l33, l41, l42, l43, l44] = self.factor_px(pixel)?;
         let [a, b, c, d] = by_pixels;
@@ -164,7 +166,7 @@ impl<'a> Pair<'a> {
             h * l44,
         ];
         let squares = |[a, b, c, d]: [f32; 4]| a * a + b * b + c * c + d * d;
-        let noise_px2 = self.header.noise_px2;
+        let noise_px2 = noise.map_or(self.header.noise_px2, MatchNoise::px2);
         Some(PointCovariance {
             calibration_mm2: sum_of_squares(&columns, 1.0),
             noise_mm2: sum_of_squares(by_pixels, noise_px2),
@@ -269,7 +271,8 @@ mod tests {
         let zero = Vector3::zeros();
         let by_pixels = [by_u, zero, -by_u, zero];
         let pixel = PixelPoint::new(12.0, 18.0);
-        let found = pair(&nodes).covariance(pixel, &by_pixels, [1.0, 2.0, -1.0, 2.0], 0.5);
+        let by_gap = [1.0, 2.0, -1.0, 2.0];
+        let found = pair(&nodes).covariance(pixel, &by_pixels, by_gap, 0.5, None);
         let found = found.unwrap();
         // Noise: 10 of 0.25 px^2; of the calibration nothing but the first row's difference.
         assert_eq!(found.gap_mm2, 0.5 * 10.0 * 0.25);
@@ -277,8 +280,15 @@ mod tests {
         // 2 coordinates of 0.25 px^2, 2 mm/px each.
         assert_eq!(found.noise_mm2.m11, 2.0);
         assert_eq!(found.sigma_mm(), [libm::sqrtf(2.0), 0.0, 0.0]);
+        // Matches of twice the noise: four times its part, and the calibration's as before.
+        let noise = MatchNoise::from_px(1.0);
+        let noisy = pair(&nodes).covariance(pixel, &by_pixels, by_gap, 0.5, noise);
+        let noisy = noisy.unwrap();
+        assert_eq!(noisy.noise_mm2, found.noise_mm2 * 4.0);
+        assert_eq!(noisy.gap_mm2, found.gap_mm2 * 4.0);
+        assert_eq!(noisy.calibration_mm2, found.calibration_mm2);
         let same = [by_u, zero, by_u, zero];
-        let found = pair(&nodes).covariance(pixel, &same, [1.0, 0.0, 1.0, 0.0], 1.0);
+        let found = pair(&nodes).covariance(pixel, &same, [1.0, 0.0, 1.0, 0.0], 1.0, None);
         let found = found.unwrap();
         assert!((found.calibration_mm2.m11 - 1.44).abs() < 1e-5);
         // Twice 0.3 px together, and twice 0.25 px^2.

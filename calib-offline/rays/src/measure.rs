@@ -55,9 +55,21 @@ pub struct Point<N> {
     pub point_mm: [N; 3],
     /// Length of the common perpendicular, mm.
     pub gap_mm: N,
-    /// Predicted standard deviation along each axis, mm: what the calibration leaves uncertain, and
-    /// pixel noise of the size of the corners'. `None` where the rig does not say.
+    /// Predicted standard deviation along each axis, mm: what the calibration leaves uncertain, and the
+    /// noise of the pixels. `None` where the rig does not say.
     pub sigma_mm: Option<[N; 3]>,
+}
+
+/// A gap beside what is predicted of it: pixels whose coordinates are off by `s` px give it the variance
+/// `calibration_mm2 + s * s * mm2_per_px2`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gap {
+    /// Length of the common perpendicular, mm.
+    pub gap_mm: f64,
+    /// What the calibration leaves uncertain of it, mm^2.
+    pub calibration_mm2: f64,
+    /// What noise of one pixel makes of it, mm^2/px^2.
+    pub mm2_per_px2: f64,
 }
 
 /// Turns matches into points.
@@ -73,6 +85,11 @@ pub trait PointSource: Sync {
     /// # Errors
     /// [`Status`] where there is none.
     fn point(&self, sightings: &[Sighting<Self::Number>]) -> Result<Point<Self::Number>, Status>;
+
+    /// The gap of two sightings; `None` where there is no point or nothing is known of its uncertainty.
+    fn gap(&self, _sightings: &[Sighting<Self::Number>]) -> Option<Gap> {
+        None
+    }
 }
 
 /// Turns many matches of two cameras at once into points: for one that is far away.
@@ -157,6 +174,11 @@ impl PointSource for RigSource<'_> {
             gap_mm: found.gap_mm,
             sigma_mm: self.sigma_mm(sightings),
         })
+    }
+
+    fn gap(&self, sightings: &[Sighting<f64>]) -> Option<Gap> {
+        let [a, b] = *sightings else { return None };
+        self.rig.pair_gap([pixel(a), pixel(b)])
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::Outcome;
 use super::error::Error;
+use super::match_noise::parse;
 use super::output::Console;
 use super::place::check_results_folder;
 use crate::methods::{self, Method};
@@ -72,6 +73,10 @@ pub struct CalibrateArgs {
     /// Leave these poses out, besides those that the manifest leaves out
     #[arg(long, value_name = "POSE", value_delimiter = ',')]
     pub exclude: Vec<usize>,
+    /// How noisy the pixels of matches will be: standard deviation of a coordinate, px
+    /// [default: as the corners]
+    #[arg(long, value_name = "S", value_parser = parse)]
+    pub match_noise_px: Option<f64>,
     /// Write one ray per pixel of each camera too: `rays_NAME.npy`
     #[arg(long)]
     pub ray_tables: bool,
@@ -149,6 +154,7 @@ pub fn run(
     let settings = CalibrateSettings {
         method: args.method.method(),
         ray_tables: args.ray_tables,
+        match_noise_px: args.match_noise_px,
         ..CalibrateSettings::default()
     };
     let written = calibrate_into(&args.output, &dataset, &settings, console, estimate)?;

@@ -8,7 +8,7 @@ use crate::device::DeviceError;
 use crate::pipeline::CalibrateError;
 use crate::report::store::CalibrationError;
 use calib_blob::export::ExportError;
-use calib_blob::matches::MatchesError;
+use calib_blob::matches::{MatchesError, NoiseError};
 use calib_blob::pack::{BlobError, PackError};
 use calib_rays::remedy::Remedy;
 use calib_recording::atomic_file::WriteError;
@@ -47,6 +47,9 @@ pub enum Error {
     /// Matches that were read.
     #[error("the matches cannot be used")]
     Matches(#[from] MatchesError),
+    /// Gaps that do not say how noisy matches are.
+    #[error("the noise of the matches cannot be estimated")]
+    Noise(#[from] NoiseError),
     /// A rig that was to be packed.
     #[error("the calibration cannot be packed")]
     Pack(#[from] PackError),
@@ -150,6 +153,7 @@ impl Error {
             Self::Calibrate(error) => error.is_undetermined(),
             Self::Target(error) => matches!(error, TargetError::AllRefused { .. }),
             Self::Pack(error) => matches!(error, PackError::NothingCalibrated { .. }),
+            Self::Noise(error) => !matches!(error, NoiseError::NothingPredicted),
             _ => false,
         };
         if is_undetermined {
@@ -171,6 +175,7 @@ impl Remedy for Error {
             Self::Calibration(error) => error.remedy(),
             Self::Blob(error) => error.remedy(),
             Self::Matches(error) => error.remedy(),
+            Self::Noise(error) => error.remedy(),
             Self::Pack(error) => error.remedy(),
             Self::Export(error) => error.remedy(),
             Self::Device(error) => error.remedy(),

@@ -15,8 +15,8 @@ use calib_recording::dataset::identity::hex;
 use calib_recording::dataset::load_corners;
 use calib_recording::dataset::split::without_excluded;
 use clap::Args;
-use ray_runtime::RayBlob;
 use ray_runtime::format::aligned;
+use ray_runtime::{MatchNoise, RayBlob};
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -42,7 +42,8 @@ With --json, kind calibration of schema calib-offline/inspect/1:
 With --json, kind blob of schema calib-offline/inspect/1:
   kind, bytes, identity, frame, written_by, max_error_px, working_distance_mm, self_tests
   cameras (name, sensor_px, region_px, cells, form, central, position_mm)
-  pairs (cameras, nodes, bytes, noise_px)    whose uncertainty it carries";
+  pairs (cameras, nodes, bytes, noise_px)    whose uncertainty it carries; the corners' noise
+  match_noise_px                             what sigma is computed with; null: the corners' noise";
 
 /// The arguments.
 #[derive(Debug, Args)]
@@ -109,6 +110,7 @@ struct BlobObject {
     self_tests: usize,
     cameras: Vec<BlobCamera>,
     pairs: Vec<BlobPair>,
+    match_noise_px: Option<f32>,
 }
 
 #[derive(Debug, Serialize)]
@@ -129,7 +131,7 @@ struct BlobPair {
     cameras: [String; 2],
     nodes: [u16; 2],
     bytes: usize,
-    /// Standard deviation of a measured pixel coordinate.
+    /// Standard deviation of a pixel coordinate of the calibration's corners.
     noise_px: f32,
 }
 
@@ -317,6 +319,7 @@ fn blob_object(blob: &RayBlob<'_>) -> BlobObject {
                 noise_px: pair.noise_px2.sqrt(),
             })
             .collect(),
+        match_noise_px: blob.match_noise().map(MatchNoise::px),
     }
 }
 
@@ -353,9 +356,16 @@ fn blob_words(object: &BlobObject) -> String {
         let ([first, second], [nodes_u, nodes_v]) = (&pair.cameras, pair.nodes);
         let _ = writeln!(
             words,
-            "uncertainty     of {first} with {second}, {nodes_u} x {nodes_v} nodes, {} bytes; pixel noise {} px",
+            "uncertainty     of {first} with {second}, {nodes_u} x {nodes_v} nodes, {} bytes; corners off by {} px",
             pair.bytes,
             short(f64::from(pair.noise_px))
+        );
+    }
+    if let Some(noise_px) = object.match_noise_px {
+        let noise = short(f64::from(noise_px));
+        let _ = writeln!(
+            words,
+            "matches         off by {noise} px per coordinate, as its sigma takes them to be"
         );
     }
     if object.pairs.is_empty() {

@@ -3,6 +3,7 @@
 
 use super::Outcome;
 use super::error::Error;
+use super::match_noise::{in_f32, parse};
 use super::output::Console;
 use super::place::check_file;
 use super::rig_file::{RigFile, open};
@@ -10,8 +11,8 @@ use super::usage_error::UsageError;
 use crate::device::{DeviceSource, connect};
 use crate::present::numbers::short;
 use calib_blob::matches::{
-    BlobSource, MatchesError, MeasureSummary, POINTS_HEADER, StreamError, measure_batches,
-    measure_with_blob, measure_with_calibration,
+    BlobSource, MatchesError, MeasureSummary, NoiseEstimate, POINTS_HEADER, StreamError,
+    estimate_noise, measure_batches, measure_stream,
 };
 use calib_rays::measure::{PointSource, RigSource};
 use calib_recording::atomic_file::{PendingFile, WriteError};
@@ -26,6 +27,7 @@ const EXAMPLE: &str = "\
 Example:
   calib-offline measure results/rig.rays matches.csv -o points.csv
   calib-offline measure results/calibration.json matches.csv -o points.csv --frame left
+  calib-offline measure results/rig.rays matches.csv -o points.csv --match-noise-px 0.2
   calib-offline measure --device tcp:127.0.0.1:7777 matches.csv -o points.csv";
 
 const FORMATS: &str = "\
@@ -35,7 +37,13 @@ POINTS.csv has the header id,x,y,z,gap,sigma_x,sigma_y,sigma_z,status and one ro
 the order of the matches; lengths in mm. The status is ok, outside (of the calibrated area),
 parallel or behind; only ok has numbers. sigma is the predicted standard deviation of the point, for
 matches of two cameras whose uncertainty the rig carries: what the calibration leaves open (a rigid
-motion of the whole rig taken out) and pixel noise of the size of its corners'. Else it is empty.
+motion of the whole rig taken out) and the noise of the pixels. Else it is empty.
+
+A matcher is seldom as exact as the corners of the calibration. The noise of the pixels is that of
+--match-noise-px, else what calibrate or pack --match-noise-px wrote into the rig, else that of the
+corners. --estimate-match-noise finds it from the gaps of these very matches and says how well: a median,
+so that wrong matches hardly count. Gaps see only the noise across the plane of the two rays; that
+within it, which makes most of the error in depth, is taken to be as large.
 
 A blob is evaluated with the device's own library and gives the device's bits; a calibration is
 evaluated in double precision. With --device the device measures, with the blob it has in use: the
@@ -45,7 +53,11 @@ An earlier POINTS.csv is replaced; any other file only with --force.
 With --json, schema calib-offline/measure/1:
   rig          the device's address with --device
   rig_kind     blob, calibration or device
-  frame, output, matches, ok, outside, parallel, behind, gap_rms_mm";
+  frame, output, matches, ok, outside, parallel, behind, gap_rms_mm
+  match_noise_px
+               what sigma was computed with; null: the corners' noise, or what the device's blob says
+  estimated_match_noise (px, low_px, high_px, gaps)
+               with --estimate-match-noise, and its 95 % interval; else null";
 
 /// The arguments.
 #[derive(Debug, Args)]
@@ -70,6 +82,12 @@ pub struct MeasureArgs {
     /// Let this device measure, instead of a RIG: tcp:HOST:PORT or serial:PORT@BAUD
     #[arg(long, value_name = "ADDRESS")]
     pub device: Option<String>,
+    /// How noisy the pixels of the matches are: standard deviation of a coordinate, px
+    #[arg(long, value_name = "S", value_parser = parse)]
+    pub match_noise_px: Option<f64>,
+    /// Find that from the gaps of these matches; it takes 100 of them
+    #[arg(long, conflicts_with_all = ["match_noise_px", "device"])]
+    pub estimate_match_noise: bool,
     /// Replace whatever stands in the output's place
     #[arg(long)]
     pub force: bool,
@@ -85,6 +103,15 @@ struct MeasureObject<'a> {
     output: &'a Path,
     #[serde(flatten)]
     summary: MeasureSummary,
+    #[serde(flatten)]
+    noise: NoiseUsed,
+}
+
+/// What the pixels' part of sigma comes from.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+struct NoiseUsed {
+    match_noise_px: Option<f64>,
+    estimated_match_noise: Option<NoiseEstimate>,
 }
 
 /// Runs the command.
@@ -95,11 +122,11 @@ pub fn run(args: &MeasureArgs, console: &Console) -> Result<Outcome, Error> {
     let mut inputs = vec![args.matches.as_path()];
     inputs.extend(args.rig.as_deref());
     check_file(&args.output, POINTS_HEADER.as_bytes(), &inputs, args.force)?;
-    let (rig, kind, summary) = match (&args.device, &args.rig) {
+    let (rig, kind, (summary, noise)) = match (&args.device, &args.rig) {
         (Some(address), _) => (Path::new(address), "device", measure_there(args, address)?),
         (None, Some(rig)) => {
-            let (kind, summary) = measure_here(args, rig)?;
-            (rig.as_path(), kind, summary)
+            let (kind, measured) = measure_here(args, rig)?;
+            (rig.as_path(), kind, measured)
         }
         (None, None) => return Err(Error::Usage(UsageError::NoDevice)),
     };
@@ -110,76 +137,163 @@ pub fn run(args: &MeasureArgs, console: &Console) -> Result<Outcome, Error> {
         frame: args.frame.as_deref().unwrap_or("rig"),
         output: &args.output,
         summary,
+        noise,
     };
     console.result(&in_words(&object), &object);
     Ok(Outcome::Done)
 }
 
+/// What became of the matches, and with which noise.
+type Measured = (MeasureSummary, NoiseUsed);
+
 /// Has a device measure.
-fn measure_there(args: &MeasureArgs, address: &str) -> Result<MeasureSummary, Error> {
+fn measure_there(args: &MeasureArgs, address: &str) -> Result<Measured, Error> {
     let client = connect(address, DEFAULT_TIMEOUT)?;
-    let mut source = DeviceSource::new(client, address)?;
-    stream(args, |file, input, output| {
+    let noise = args.match_noise_px.and_then(in_f32);
+    let mut source = DeviceSource::new(client, address)?.with_noise(noise);
+    let mut input = open_matches(args)?;
+    let summary = stream(args, &mut input, |file, input, output| {
         measure_batches(&mut source, file, input, output)
-    })
+    })?;
+    let noise = NoiseUsed {
+        match_noise_px: args.match_noise_px,
+        estimated_match_noise: None,
+    };
+    Ok((summary, noise))
 }
 
 /// Measures with a file; what kind it is, too.
-fn measure_here(args: &MeasureArgs, rig: &Path) -> Result<(&'static str, MeasureSummary), Error> {
+fn measure_here(args: &MeasureArgs, rig: &Path) -> Result<(&'static str, Measured), Error> {
     let frame = args.frame.as_deref();
     Ok(match RigFile::read(rig)? {
         RigFile::Blob(bytes) => {
             let blob = open(&bytes, rig)?;
-            let names = names(BlobSource::new(&blob, None));
-            let source = BlobSource::new(&blob, frame);
-            let measured = measure(args, rig, source.as_ref(), names, measure_with_blob)?;
-            ("blob", measured)
+            let source = checked(
+                args,
+                rig,
+                &BlobSource::new(&blob, None),
+                BlobSource::new(&blob, frame),
+            )?;
+            let (mut input, noise) = prepare(args, &source)?;
+            let own_px = blob.match_noise().map(|noise| f64::from(noise.px()));
+            let source = match noise.match_noise_px.and_then(in_f32) {
+                Some(noise) => source.with_noise(noise),
+                None => source,
+            };
+            let summary = measure(args, &mut input, &source)?;
+            ("blob", (summary, noise.or_of_rig(own_px)))
         }
-        RigFile::Calibration(calibration) => {
-            let names = names(RigSource::new(&calibration.rig, None));
-            let source = RigSource::new(&calibration.rig, frame);
-            let measured = measure(args, rig, source.as_ref(), names, measure_with_calibration)?;
-            ("calibration", measured)
+        RigFile::Calibration(mut calibration) => {
+            let (mut input, noise) = {
+                let own = &calibration.rig;
+                let source = checked(
+                    args,
+                    rig,
+                    &RigSource::new(own, None),
+                    RigSource::new(own, frame),
+                )?;
+                prepare(args, &source)?
+            };
+            let own = &mut calibration.rig;
+            let noise = noise.or_of_rig(own.match_noise_px);
+            own.match_noise_px = noise.match_noise_px;
+            let source = checked(
+                args,
+                rig,
+                &RigSource::new(own, None),
+                RigSource::new(own, frame),
+            )?;
+            ("calibration", (measure(args, &mut input, &source)?, noise))
         }
     })
 }
 
-fn names(source: Option<impl PointSource>) -> Vec<String> {
-    source.map(|source| source.cameras()).unwrap_or_default()
-}
-
-/// `source` is none where the frame is none of the cameras `known`.
-fn measure<S>(
+/// The source of the frame asked for, if the rig has that and two cameras; `in_rig` is that of its own frame.
+fn checked<S: PointSource>(
     args: &MeasureArgs,
     rig: &Path,
-    source: Option<&S>,
-    known: Vec<String>,
-    measure: impl FnOnce(
-        &S,
-        &Path,
-        &mut dyn Read,
-        &mut dyn Write,
-    ) -> Result<MeasureSummary, StreamError>,
-) -> Result<MeasureSummary, Error> {
+    in_rig: &Option<S>,
+    in_frame: Option<S>,
+) -> Result<S, UsageError> {
+    let known = in_rig
+        .as_ref()
+        .map(PointSource::cameras)
+        .unwrap_or_default();
     if known.len() < 2 {
-        return Err(Error::Usage(UsageError::OneCamera {
+        return Err(UsageError::OneCamera {
             path: rig.to_owned(),
-        }));
+        });
     }
-    let Some(source) = source else {
-        return Err(Error::Usage(UsageError::UnknownFrame {
-            name: args.frame.clone().unwrap_or_default(),
-            known,
-        }));
-    };
-    stream(args, |file, input, output| {
-        measure(source, file, input, output)
+    in_frame.ok_or_else(|| UsageError::UnknownFrame {
+        name: args.frame.clone().unwrap_or_default(),
+        known,
     })
 }
 
-/// Opens the matches, has them measured, and keeps the points if all went well.
+impl NoiseUsed {
+    /// This, or what the rig says itself.
+    fn or_of_rig(self, own_px: Option<f64>) -> Self {
+        Self {
+            match_noise_px: self.match_noise_px.or(own_px),
+            ..self
+        }
+    }
+}
+
+/// The matches, and how noisy they are if it was said or is to be estimated: then they are held in memory.
+fn prepare(
+    args: &MeasureArgs,
+    source: &impl PointSource,
+) -> Result<(Box<dyn Read>, NoiseUsed), Error> {
+    let mut input = open_matches(args)?;
+    if !args.estimate_match_noise {
+        let noise = NoiseUsed {
+            match_noise_px: args.match_noise_px,
+            estimated_match_noise: None,
+        };
+        return Ok((input, noise));
+    }
+    let mut bytes = Vec::new();
+    input
+        .read_to_end(&mut bytes)
+        .map_err(|source| MatchesError::Read {
+            file: args.matches.clone(),
+            source,
+        })?;
+    let estimate = estimate_noise(source, &args.matches, &mut bytes.as_slice())??;
+    let noise = NoiseUsed {
+        match_noise_px: Some(estimate.px),
+        estimated_match_noise: Some(estimate),
+    };
+    Ok((Box::new(std::io::Cursor::new(bytes)), noise))
+}
+
+fn measure(
+    args: &MeasureArgs,
+    input: &mut Box<dyn Read>,
+    source: &impl PointSource,
+) -> Result<MeasureSummary, Error> {
+    stream(args, input, |file, input, output| {
+        measure_stream(source, file, input, output)
+    })
+}
+
+fn open_matches(args: &MeasureArgs) -> Result<Box<dyn Read>, MatchesError> {
+    Ok(if args.matches.as_os_str() == "-" {
+        Box::new(std::io::stdin().lock())
+    } else {
+        let file = File::open(&args.matches).map_err(|source| MatchesError::Read {
+            file: args.matches.clone(),
+            source,
+        })?;
+        Box::new(file)
+    })
+}
+
+/// Has the matches measured, and keeps the points if all went well.
 fn stream<E>(
     args: &MeasureArgs,
+    input: &mut Box<dyn Read>,
     measure: impl FnOnce(
         &Path,
         &mut Box<dyn Read>,
@@ -189,17 +303,8 @@ fn stream<E>(
 where
     Error: From<E>,
 {
-    let mut input: Box<dyn Read> = if args.matches.as_os_str() == "-" {
-        Box::new(std::io::stdin().lock())
-    } else {
-        let file = File::open(&args.matches).map_err(|source| MatchesError::Read {
-            file: args.matches.clone(),
-            source,
-        })?;
-        Box::new(file)
-    };
     let mut output = PendingFile::create(&args.output)?;
-    let summary = measure(&args.matches, &mut input, &mut output).map_err(|error| match error {
+    let summary = measure(&args.matches, input, &mut output).map_err(|error| match error {
         StreamError::Matches(error) => Error::Matches(error),
         StreamError::Write(source) => Error::Write(WriteError::Io {
             path: args.output.clone(),
@@ -229,9 +334,16 @@ fn in_words(object: &MeasureObject<'_>) -> String {
     if let Some(gap_mm) = summary.gap_rms_mm {
         parts.push(format!("gap {} mm RMS", short(gap_mm)));
     }
-    format!(
-        "{}; written to {}",
-        parts.join(", "),
-        object.output.display()
-    )
+    let mut words = parts.join(", ");
+    if let Some(found) = &object.noise.estimated_match_noise {
+        words += &format!(
+            "; the matches are off by {} px per coordinate ({} to {} px with 95 % confidence), by the median of {} gaps: \
+             across the plane of the two rays, and within it taken to be as much",
+            short(found.px),
+            short(found.low_px),
+            short(found.high_px),
+            found.gaps
+        );
+    }
+    format!("{words}; written to {}", object.output.display())
 }

@@ -3,6 +3,7 @@
 use super::Outcome;
 use super::calibrate::{BLOB_MAX_ERROR_PX, pack_settings};
 use super::error::Error;
+use super::match_noise::parse;
 use super::output::Console;
 use super::place::check_file;
 use crate::present::numbers::short;
@@ -39,6 +40,7 @@ With --json, schema calib-offline/pack/2:
   cameras (name, form, central, cells, bytes, worst_error_px, worst_error_mm)
   pairs (cameras, nodes, bytes, sigma_error/calibration_sigma_error (rms, worst))
                     relative
+  match_noise_px    what sigma is computed with; null: the corners' noise
   curve (bytes, error_px, error_mm)
                     bytes of all tables";
 
@@ -61,6 +63,10 @@ pub struct PackArgs {
     /// What matters within these limits
     #[arg(long, value_name = "WHAT", value_enum, default_value_t = PreferArg::Size)]
     pub prefer: PreferArg,
+    /// How noisy the pixels of matches will be: standard deviation of a coordinate, px
+    /// [default: as the calibration says, else as its corners]
+    #[arg(long, value_name = "S", value_parser = parse)]
+    pub match_noise_px: Option<f64>,
     /// Leave out the uncertainty: a smaller blob, and no sigma from it
     #[arg(long)]
     pub no_uncertainty: bool,
@@ -89,6 +95,7 @@ struct PackObject<'a> {
     worst_error_mm: f64,
     cameras: Vec<PackedCamera>,
     pairs: Vec<PairObject>,
+    match_noise_px: Option<f64>,
     curve: Vec<CurvePoint>,
 }
 
@@ -118,7 +125,7 @@ struct PairObject {
 /// [`Error`], with nothing written.
 pub fn run(args: &PackArgs, console: &Console) -> Result<Outcome, Error> {
     check_file(&args.output, &MAGIC, &[&args.calibration], args.force)?;
-    let calibration = Calibration::load(&args.calibration)?;
+    let mut calibration = Calibration::load(&args.calibration)?;
     console.progress().begin("packing the blob", 0);
     let default_px = match args.max_bytes {
         Some(_) => LOOSEST_PX,
@@ -133,7 +140,9 @@ pub fn run(args: &PackArgs, console: &Console) -> Result<Outcome, Error> {
         },
         ..pack_settings(&calibration, max_error_px)
     };
-    let rig = &calibration.rig;
+    let rig = &mut calibration.rig;
+    rig.match_noise_px = args.match_noise_px.or(rig.match_noise_px);
+    let rig = &*rig;
     let packed = match args.max_bytes {
         Some(max_bytes) if args.max_error_px.is_none() => {
             pack_within_bytes(rig, &settings, max_bytes)
@@ -177,6 +186,7 @@ pub fn run(args: &PackArgs, console: &Console) -> Result<Outcome, Error> {
                 calibration_sigma_error: pair.calibration_sigma_error,
             })
             .collect(),
+        match_noise_px: rig.match_noise_px,
         curve: packed.curve,
     };
     let uncertainty: String = object.pairs.iter().map(pair_words).collect();

@@ -43,6 +43,9 @@ pub enum DeviceError {
     /// Its blob has one camera.
     #[error("the device's blob has one camera, a point takes two")]
     OneCamera,
+    /// It is older than requests that say how noisy matches are.
+    #[error("the device's firmware does not take the noise of matches with a request")]
+    NoMatchNoise,
     /// A code that this program does not know.
     #[error("the device gave code {code} in place of a point, which this program does not know")]
     UnknownOutcome {
@@ -60,6 +63,7 @@ impl Remedy for DeviceError {
             }
             Self::TooManyCameras { .. } => "measure here, with the blob",
             Self::OneCamera => "calibrate two cameras together; a single one gives rays only",
+            Self::NoMatchNoise => "bring its firmware up to date, or measure here, with the blob",
             Self::UnknownOutcome { .. } => "bring this program up to date",
         };
         Some(text.to_owned())

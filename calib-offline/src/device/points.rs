@@ -2,15 +2,16 @@
 
 use super::DeviceError;
 use calib_rays::measure::{Answers, BatchSource, Point, Sighting, Status};
-use firmware_sim::client::DeviceClient;
-use ray_device::protocol::{self, Match};
-use ray_runtime::{LookupError, MeasureError};
+use firmware_sim::client::{ClientError, DeviceClient};
+use ray_device::protocol::{self, Match, Refusal};
+use ray_runtime::{LookupError, MatchNoise, MeasureError};
 
 /// A device that triangulates: the bits of the blob in its flash, measured there.
 #[derive(Debug)]
 pub struct DeviceSource {
     client: DeviceClient,
     cameras: Vec<String>,
+    noise: Option<MatchNoise>,
 }
 
 impl DeviceSource {
@@ -37,7 +38,15 @@ impl DeviceSource {
         Ok(Self {
             client,
             cameras: cameras.map(|camera| camera.name.to_string()).collect(),
+            noise: None,
         })
+    }
+
+    /// The same, of pixels that are as noisy as this, whatever the device's blob says of them.
+    #[must_use]
+    pub fn with_noise(mut self, noise: Option<MatchNoise>) -> Self {
+        self.noise = noise;
+        self
     }
 }
 
@@ -50,7 +59,17 @@ impl BatchSource for DeviceSource {
     }
 
     fn points(&mut self, matches: &[[Sighting<f32>; 2]]) -> Result<Answers<f32>, DeviceError> {
-        let measured = self.client.measure(&on_wire(matches))?;
+        let matches = on_wire(matches);
+        let measured = match self.noise {
+            None => self.client.measure(&matches)?,
+            Some(noise) => {
+                let measured = self.client.measure_noisy(&matches, noise);
+                measured.map_err(|error| match error {
+                    ClientError::Refused(Refusal::UnknownMessage) => DeviceError::NoMatchNoise,
+                    error => error.into(),
+                })?
+            }
+        };
         let answers = measured.into_iter().map(|answer| match answer.outcome {
             Ok(found) => Ok(Ok(Point {
                 point_mm: found.point_mm,

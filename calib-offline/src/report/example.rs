@@ -91,6 +91,7 @@ pub fn calibration() -> Calibration {
             uncertainty: vec![uncertainty()],
             cameras,
             datum_pose: 8,
+            match_noise_px: None,
         },
         estimate: estimate(&corners),
         stage_axes: calib_judge::fit_stage_axes(&boards, |pose| Some(pose / 17)),

@@ -6,6 +6,7 @@ use super::record::SCHEMA;
 use calib_rays::field::polynomial::{MAX_DEGREE, term_count};
 use calib_rays::field::{CalibratedCamera, PairUncertainty, SmoothMap};
 use calib_rays::remedy::Remedy;
+use ray_runtime::MatchNoise;
 use ray_runtime::format::IDENTITY_LEN;
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
@@ -165,6 +166,12 @@ impl Calibration {
                     .iter()
                     .all(|pair| pair_is_whole(pair, cameras)),
                 "the uncertainty of a pair of cameras has the wrong length or is not finite",
+            ),
+            (
+                self.rig
+                    .match_noise_px
+                    .is_none_or(|px| MatchNoise::from_px(px as f32).is_some()),
+                "the noise of matches is not 0 to 1000 px",
             ),
             (
                 self.board.rows > 0 && self.board.cols > 0 && self.board.square_mm > 0.0,

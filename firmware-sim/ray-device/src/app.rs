@@ -15,7 +15,7 @@
 mod self_test;
 
 use heapless::Vec;
-use ray_runtime::{MeasureError, OpenError, PixelPoint, RayBlob};
+use ray_runtime::{MatchNoise, MeasureError, OpenError, PixelPoint, RayBlob};
 
 use crate::health::Health;
 use crate::port::{Clock, MappedFlash, Regions};
@@ -132,13 +132,17 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
         let reply = match request {
             Request::Hello => Ok(Reply::Hello(self.hello())),
             Request::Status => Ok(Reply::Status(self.status())),
-            Request::Measure(matches) => self.measure(matches),
+            Request::Measure(matches) => self.measure(matches, None),
             Request::BeginUpdate(new) => self.begin_update(peer, new),
             Request::Chunk(chunk) => self.store(peer, chunk),
             Request::FinishUpdate => self.finish_update(peer),
             Request::AbortUpdate => self.abort_update(peer),
             Request::Rollback => self.rollback(peer),
             Request::SelfTest => self.self_test(),
+            Request::MeasureNoisy(asked) => match MatchNoise::from_px(asked.noise_px) {
+                Some(noise) => self.measure(&asked.matches, Some(noise)),
+                None => Err(Refusal::BadNoise),
+            },
         };
         match reply {
             Ok(reply) => {
@@ -187,10 +191,12 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
     }
 
     #[inline(never)]
-    fn measure(&mut self, matches: &[Match]) -> Result<Reply, Refusal> {
+    fn measure(&mut self, matches: &[Match], noise: Option<MatchNoise>) -> Result<Reply, Refusal> {
         let blob = opened(&self.blob)?;
         let health = &mut self.device.health;
-        let measured = matches.iter().map(|asked| measure_one(blob, asked, health));
+        let measured = matches
+            .iter()
+            .map(|asked| measure_one(blob, asked, noise, health));
         Ok(Reply::Measured(bounded(measured)))
     }
 
@@ -363,14 +369,24 @@ fn blob_status(blob: &RayBlob<'_>) -> BlobStatus {
     }
 }
 
-fn measure_one(blob: &RayBlob<'_>, asked: &Match, health: &mut Health) -> Measured {
+/// `noise` is the blob's business where it is none.
+fn measure_one(
+    blob: &RayBlob<'_>,
+    asked: &Match,
+    noise: Option<MatchNoise>,
+    health: &mut Health,
+) -> Measured {
     let pixel_of = |sighting: Sighting| {
         (
             usize::from(sighting.camera),
             PixelPoint::new(sighting.u_px, sighting.v_px),
         )
     };
-    let outcome = blob.triangulate_with_covariance(pixel_of(asked.first), pixel_of(asked.second));
+    let (first, second) = (pixel_of(asked.first), pixel_of(asked.second));
+    let outcome = match noise {
+        Some(noise) => blob.triangulate_with_noise(first, second, noise),
+        None => blob.triangulate_with_covariance(first, second),
+    };
     if let Ok(measured) = &outcome {
         health.note(measured);
     }

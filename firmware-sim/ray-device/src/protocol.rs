@@ -72,6 +72,9 @@ pub enum Request {
     Rollback,
     /// Compare the active blob's self-tests. Answered by [`Reply::SelfTested`].
     SelfTest,
+    /// Triangulate these, whose pixels are as noisy as said here. Answered by [`Reply::Measured`], or refused with
+    /// [`Refusal::BadNoise`]. A device that does not know it answers [`Refusal::UnknownMessage`].
+    MeasureNoisy(NoisyMatches),
 }
 
 /// What a device answers.
@@ -176,6 +179,15 @@ pub struct SelfTestReport {
     pub worst_direction: f32,
 }
 
+/// Matches with the noise of their pixels, in place of what the blob says of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NoisyMatches {
+    /// Standard deviation of each pixel coordinate, px, in the range of the runtime's `MatchNoise`.
+    pub noise_px: f32,
+    /// The matches.
+    pub matches: Vec<Match, MAX_MATCHES>,
+}
+
 /// A point seen by two cameras.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Match {
@@ -215,8 +227,8 @@ pub struct Point {
     /// Square of the length of the common perpendicular, mm². The device takes no square root of it.
     pub gap_squared_mm2: f32,
     /// Predicted standard deviation along x, y and z of the rig's frame, mm: what the calibration
-    /// leaves uncertain, and pixel noise of the size of its corners'. `None` where the blob does
-    /// not say.
+    /// leaves uncertain, and the pixels' noise, which is that of the request, else that of the blob's matches, else
+    /// that of the calibration's corners. `None` where the blob does not say.
     pub sigma_mm: Option<[f32; 3]>,
 }
 

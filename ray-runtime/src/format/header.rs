@@ -5,9 +5,10 @@ use crc::{CRC_32_ISO_HDLC, Crc, Table};
 /// The first four bytes of a blob.
 pub const MAGIC: [u8; 4] = *b"RAYS";
 /// The format version that the packer writes and the newest that this library reads.
-pub const VERSION: u16 = 3;
-/// The oldest version that this library reads: without the feature `old-versions`, the newest.
-/// Version 2 has no other [`Form`](super::Form) than splines, version 1 besides that no [`PairHeader`](super::PairHeader).
+pub const VERSION: u16 = 4;
+/// The oldest version that this library reads. Version 3 has no [`Section`](super::Section)s, version 2 besides that no
+/// other [`Form`](super::Form) than splines, version 1 no [`PairHeader`](super::PairHeader) either; the feature `old-versions` is
+/// for these two.
 pub const OLDEST_VERSION: u16 = if cfg!(feature = "old-versions") { 1 } else { 3 };
 /// Length of the header of all versions.
 pub const HEADER_LEN: usize = 24;

@@ -1,13 +1,14 @@
 //! Points from a blob, with the device's own f32 code.
 
-use calib_rays::measure::{Point, PointSource, Sighting, Status};
+use calib_rays::measure::{Gap, Point, PointSource, Sighting, Status};
 use nalgebra::{Matrix3, Vector3};
-use ray_runtime::{Measurement, RayBlob};
+use ray_runtime::{MatchNoise, Measurement, PixelPoint, RayBlob};
 
 /// A blob, evaluated by the device's own library.
 #[derive(Debug)]
 pub struct BlobSource<'a> {
     blob: &'a RayBlob<'a>,
+    noise: Option<MatchNoise>,
     /// Turned about the origin after subtracting the camera's place.
     rig_from_frame: Option<ray_runtime::RigFromCamera>,
 }
@@ -22,9 +23,21 @@ impl<'a> BlobSource<'a> {
         };
         Some(Self {
             blob,
+            noise: None,
             rig_from_frame,
         })
     }
+
+    /// The same, of pixels that are as noisy as this, whatever the blob says of them.
+    #[must_use]
+    pub fn with_noise(mut self, noise: MatchNoise) -> Self {
+        self.noise = Some(noise);
+        self
+    }
+}
+
+fn pixel((camera_idx, [u, v]): Sighting<f32>) -> (usize, PixelPoint) {
+    (camera_idx, PixelPoint::new(u, v))
 }
 
 impl PointSource for BlobSource<'_> {
@@ -38,11 +51,13 @@ impl PointSource for BlobSource<'_> {
     }
 
     fn point(&self, sightings: &[Sighting<f32>]) -> Result<Point<f32>, Status> {
-        let pixel =
-            |(camera_idx, [u, v]): Sighting<f32>| (camera_idx, ray_runtime::PixelPoint::new(u, v));
         // A blob knows pairs.
         let result = if let [a, b] = *sightings {
-            self.blob.triangulate_with_covariance(pixel(a), pixel(b))
+            let (a, b) = (pixel(a), pixel(b));
+            match self.noise {
+                Some(noise) => self.blob.triangulate_with_noise(a, b, noise),
+                None => self.blob.triangulate_with_covariance(a, b),
+            }
         } else {
             let sightings: Vec<_> = sightings.iter().copied().map(pixel).collect();
             let found = self.blob.triangulate_many(&sightings);
@@ -72,6 +87,23 @@ impl PointSource for BlobSource<'_> {
                 None => covariance.sigma_mm(),
                 Some(rig_from_frame) => sigma_in_frame(rig_from_frame, &covariance.total_mm2()),
             }),
+        })
+    }
+
+    fn gap(&self, sightings: &[Sighting<f32>]) -> Option<Gap> {
+        let [a, b] = *sightings else { return None };
+        let with = |noise| {
+            let measured = self.blob.triangulate_with_noise(pixel(a), pixel(b), noise);
+            let measured = measured.ok()?;
+            let variance_mm2 = f64::from(measured.covariance?.gap_mm2);
+            Some((f64::from(measured.found.gap_mm()), variance_mm2))
+        };
+        let (gap_mm, calibration_mm2) = with(MatchNoise::NONE)?;
+        let (_, of_one_px_mm2) = with(MatchNoise::from_px(1.0)?)?;
+        Some(Gap {
+            gap_mm,
+            calibration_mm2,
+            mm2_per_px2: of_one_px_mm2 - calibration_mm2,
         })
     }
 }

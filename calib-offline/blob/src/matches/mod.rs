@@ -9,6 +9,7 @@ mod error;
 mod header;
 pub mod known;
 mod list;
+mod noise;
 mod row;
 mod stream;
 
@@ -17,6 +18,7 @@ pub use error::MatchesError;
 pub use header::Columns;
 pub use known::{KnownMatches, TruePoint, read_known};
 pub use list::read_matches;
+pub use noise::{NoiseError, NoiseEstimate, estimate_noise};
 pub use row::POINTS_HEADER;
 pub use stream::{
     MeasureSummary, StreamError, measure_batches, measure_with_blob, measure_with_calibration,

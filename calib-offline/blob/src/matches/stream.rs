@@ -111,6 +111,37 @@ pub fn measure_batches<S: BatchSource>(
     })
 }
 
+/// Hands on the sightings of every match of `input`; `file` is for messages only.
+///
+/// # Errors
+/// [`MatchesError`].
+pub(super) fn each_match<N: Number>(
+    cameras: &[String],
+    file: &Path,
+    input: &mut impl Read,
+    mut take: impl FnMut(&[Sighting<N>]),
+) -> Result<(), MatchesError> {
+    let read = |columns: &Columns, block: &[u8]| {
+        let (lines, problem) = each_row(columns, block, |_, sightings| {
+            take(sightings);
+            Ok(())
+        });
+        Ok::<_, Infallible>(vec![Piece {
+            lines,
+            problem,
+            ..Piece::default()
+        }])
+    };
+    match measure_blocks(cameras, file, input, &mut io::sink(), read) {
+        Ok(_) => Ok(()),
+        Err(StreamError::Matches(error)) => Err(error),
+        Err(StreamError::Write(source)) => Err(MatchesError::Read {
+            file: file.to_owned(),
+            source,
+        }),
+    }
+}
+
 /// Has every block of the input measured and writes what comes of it.
 fn measure_blocks<E>(
     cameras: &[String],

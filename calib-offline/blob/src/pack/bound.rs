@@ -8,8 +8,8 @@ use super::settings::PackSettings;
 use super::{encode, proof, search, self_test, uncertainty};
 use calib_rays::field::Rig;
 use calib_rays::in_order;
-use ray_runtime::RayBlob;
 use ray_runtime::format::{MAX_CELLS, MAX_EXTENT_PX};
+use ray_runtime::{MatchNoise, RayBlob};
 
 /// Packs a rig.
 ///
@@ -32,6 +32,7 @@ pub fn pack(rig: &Rig, settings: &PackSettings) -> Result<Packed, PackError> {
         working_distance_mm: distance_mm as f32,
         self_tests: Vec::new(),
         pairs: Vec::new(),
+        match_noise: match_noise(rig)?,
     };
     // The search looked at a sample of the pixels. Now all, and quarter pixels along the edge; for a
     // camera that fails, the search starts over with a tighter bound.
@@ -125,6 +126,15 @@ pub fn pack(rig: &Rig, settings: &PackSettings) -> Result<Packed, PackError> {
 const TIGHTER: f64 = 0.98;
 /// A search whose bound fell below this share of the one asked for is given up.
 const LEAST_SHARE: f64 = 0.2;
+
+/// How noisy matches are, as a blob can say it.
+fn match_noise(rig: &Rig) -> Result<Option<MatchNoise>, PackError> {
+    let Some(value) = rig.match_noise_px else {
+        return Ok(None);
+    };
+    let noise = MatchNoise::from_px(value as f32);
+    noise.map(Some).ok_or(PackError::MatchNoise { px: value })
+}
 
 /// Settings and sizes, before anything is computed.
 fn check(rig: &Rig, settings: &PackSettings) -> Result<(), PackError> {

@@ -3,11 +3,11 @@
 use super::PackError;
 use super::table::Table;
 use calib_rays::field::{CalibratedCamera, CoverageMask, Rig};
-use ray_runtime::OpenError;
 use ray_runtime::format::{
     self, Axis, CameraMeta, HEADER_LEN, Header, IDENTITY_LEN, LengthUnit, Meta, PixelConvention,
-    RECORD_LEN, RecordFields, SelfTest, VERSION,
+    RECORD_LEN, RecordFields, SectionHeader, SelfTest, VERSION, tag,
 };
+use ray_runtime::{MatchNoise, OpenError};
 use serde::Serialize;
 
 /// What stands in a blob besides cameras and grids.
@@ -24,6 +24,8 @@ pub struct BlobParts<'a> {
     pub self_tests: Vec<SelfTest>,
     /// Header and nodes of each pair of cameras whose uncertainty is known, in ascending order.
     pub pairs: Vec<Vec<u8>>,
+    /// How noisy matches are, if it is known.
+    pub match_noise: Option<MatchNoise>,
 }
 
 impl BlobParts<'_> {
@@ -67,6 +69,9 @@ impl BlobParts<'_> {
         for pair in &self.pairs {
             tables.extend(pair);
             pad(&mut tables);
+        }
+        if let Some(noise) = self.match_noise {
+            push_section(&mut tables, tag::MATCH_NOISE, &noise.px().to_le_bytes())?;
         }
 
         let mut header = Header {
@@ -160,6 +165,19 @@ fn push_mask(tables: &mut Vec<u8>, mask: &CoverageMask) {
             .enumerate()
             .fold(0, |byte, (bit, covered)| byte | u8::from(*covered) << bit)
     }));
+}
+
+/// A section that readers which do not know it may pass over.
+fn push_section(bytes: &mut Vec<u8>, tag: u16, content: &[u8]) -> Result<(), PackError> {
+    let header = SectionHeader {
+        tag,
+        is_required: false,
+        length: length(content.len())?,
+    };
+    bytes.extend(header.to_bytes());
+    bytes.extend(content);
+    pad(bytes);
+    Ok(())
 }
 
 fn pad(bytes: &mut Vec<u8>) {

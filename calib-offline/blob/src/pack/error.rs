@@ -3,7 +3,7 @@
 use calib_rays::geometry::{PixelPoint, SensorSize};
 use calib_rays::remedy::Remedy;
 use ray_runtime::format::{MAX_CELLS, MAX_EXTENT_PX};
-use ray_runtime::{OpenError, SelfTestFailure};
+use ray_runtime::{MatchNoise, OpenError, SelfTestFailure};
 
 /// Why a rig cannot be packed.
 #[derive(Debug, thiserror::Error)]
@@ -16,6 +16,16 @@ pub enum PackError {
         setting: &'static str,
         /// Its value.
         value: f64,
+    },
+    /// The noise of matches is none that a blob can say.
+    #[error(
+        "the noise of matches is {px} px; it must be 0 or {} to {} px",
+        MatchNoise::LEAST_PX,
+        MatchNoise::MOST_PX
+    )]
+    MatchNoise {
+        /// As stated.
+        px: f64,
     },
     /// The sensor is larger than the format allows.
     #[error(
@@ -123,6 +133,9 @@ impl Remedy for PackError {
     fn remedy(&self) -> Option<String> {
         let text = match self {
             Self::BadSetting { .. } => "give a bound in pixels such as 0.001".to_owned(),
+            Self::MatchNoise { .. } => {
+                "give the standard deviation of a matched pixel with --match-noise-px".to_owned()
+            }
             Self::BoundNotReached { best_px, .. } => {
                 format!(
                     "ask for more: --max-error-px {:.1e} or above",

@@ -279,6 +279,7 @@ fn prove_sample(
         working_distance_mm: settings.working_distance_mm as f32,
         self_tests: Vec::new(),
         pairs: Vec::new(),
+        match_noise: None,
     };
     let bytes = AlignedBytes::from(parts.encode_cameras(&[(camera, table)])?.as_slice());
     let blob = RayBlob::open(&bytes)?;

@@ -72,6 +72,7 @@ fn golden_rig() -> Rig {
             },
         ],
         datum_pose: 0,
+        match_noise_px: None,
     }
 }
 

@@ -75,6 +75,7 @@ impl AlternatingEstimate {
             rig: Rig {
                 cameras,
                 datum_pose: self.observations.poses.get(self.datum).copied()?,
+                match_noise_px: None,
                 uncertainty: Vec::new(),
             },
             rms_error_px,

@@ -27,6 +27,7 @@ impl Estimate {
         Rig {
             cameras,
             datum_pose: self.observations.poses.first().copied().unwrap_or(0),
+            match_noise_px: None,
             uncertainty: Vec::new(),
         }
     }

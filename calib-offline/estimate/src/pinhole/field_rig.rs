@@ -71,6 +71,7 @@ impl PinholeRig {
             rig: Rig {
                 cameras,
                 datum_pose,
+                match_noise_px: None,
                 uncertainty: Vec::new(),
             },
             rig_from_board: self.first_from_board.iter().map(to_rig).collect(),

@@ -6,7 +6,8 @@ use crate::geometry::{
     PixelPoint, Ray, RigidTransform, Triangulation, midpoint_by_shifts, triangulate_pair,
     triangulate_rays,
 };
-use nalgebra::{Matrix3, Matrix3x2, Matrix3x4, Matrix4, Vector3};
+use crate::measure::Gap;
+use nalgebra::{Matrix3, Matrix3x2, Matrix3x4, Matrix4, Vector3, Vector4};
 use serde::{Deserialize, Serialize};
 
 /// One calibrated camera.
@@ -33,6 +34,10 @@ pub struct Rig {
     /// was not estimated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub uncertainty: Vec<PairUncertainty>,
+    /// Standard deviation of a pixel coordinate of matches, if somebody said so, px; else matches are taken to
+    /// be as exact as the calibration's corners.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub match_noise_px: Option<f64>,
 }
 
 /// Why a match has no point.
@@ -108,13 +113,56 @@ impl PointCovariance {
     }
 }
 
+/// Two sightings of a pair with uncertainty, the pair's first camera first.
+struct SeenPair<'a> {
+    uncertainty: &'a PairUncertainty,
+    /// Of the pair's first camera.
+    pixel: PixelPoint,
+    /// Columns: what a pixel of each coordinate does to the point, mm/px.
+    by_pixels: Matrix3x4<f64>,
+    gap_mm: f64,
+    /// The same of the gap, taken with its sign.
+    gap_by_pixels: Vector4<f64>,
+}
+
+impl SeenPair<'_> {
+    fn calibration_px2(&self) -> Matrix4<f64> {
+        self.uncertainty.calibration_at(self.pixel)
+    }
+}
+
 impl Rig {
     /// Covariance of the point of two sightings, in either order; `None` if the pair has no
     /// uncertainty, for a pixel without a ray, and for parallel rays.
     ///
     /// `J (C + noise I) J^T` with the derivative J of the midpoint by the four pixel coordinates
-    /// and the pair's covariance C of pixels (METHOD 5).
+    /// and the pair's covariance C of pixels (METHOD 5); the noise is that of matches where it was stated, else that
+    /// of the corners.
     pub fn pair_covariance(&self, sightings: [(usize, PixelPoint); 2]) -> Option<PointCovariance> {
+        let seen = self.seen_pair(sightings)?;
+        let noise_px2 = self
+            .match_noise_px
+            .map_or(seen.uncertainty.noise_px2, |px| px * px);
+        let carry = |px2: Matrix4<f64>| seen.by_pixels * px2 * seen.by_pixels.transpose();
+        Some(PointCovariance {
+            calibration_mm2: carry(seen.calibration_px2()),
+            noise_mm2: carry(Matrix4::identity() * noise_px2),
+        })
+    }
+
+    /// The gap of two sightings and what is predicted of it; `None` as in [`pair_covariance`](Self::pair_covariance).
+    pub fn pair_gap(&self, sightings: [(usize, PixelPoint); 2]) -> Option<Gap> {
+        let seen = self.seen_pair(sightings)?;
+        let by_pixels = &seen.gap_by_pixels;
+        Some(Gap {
+            gap_mm: seen.gap_mm,
+            calibration_mm2: by_pixels.dot(&(seen.calibration_px2() * by_pixels)),
+            mm2_per_px2: by_pixels.norm_squared(),
+        })
+    }
+
+    /// How the point and the gap of two sightings move with their pixels.
+    fn seen_pair(&self, sightings: [(usize, PixelPoint); 2]) -> Option<SeenPair<'_>> {
         let pair = |first: usize, second: usize| {
             self.uncertainty
                 .iter()
@@ -130,20 +178,26 @@ impl Rig {
             Some((camera, camera.ray_in_rig(pixel)?))
         };
         let ((camera_a, ray_a), (camera_b, ray_b)) = (see(a)?, see(b)?);
-        let point = triangulate_pair(&ray_a, &ray_b).ok()?.point_mm;
+        let found = triangulate_pair(&ray_a, &ray_b).ok()?;
         let (by_a, by_b) = midpoint_by_shifts(&ray_a, &ray_b)?;
-        // Columns: what a pixel of each coordinate does to the point.
+        let shift_a = camera_a.ray_shift_mm_per_px(a.1, &found.point_mm);
+        let shift_b = camera_b.ray_shift_mm_per_px(b.1, &found.point_mm);
         let mut by_pixels = Matrix3x4::zeros();
         by_pixels
             .fixed_columns_mut::<2>(0)
-            .copy_from(&(by_a * camera_a.ray_shift_mm_per_px(a.1, &point)));
+            .copy_from(&(by_a * shift_a));
         by_pixels
             .fixed_columns_mut::<2>(2)
-            .copy_from(&(by_b * camera_b.ray_shift_mm_per_px(b.1, &point)));
-        let carry = |px2: Matrix4<f64>| by_pixels * px2 * by_pixels.transpose();
-        Some(PointCovariance {
-            calibration_mm2: carry(uncertainty.calibration_at(a.1)),
-            noise_mm2: carry(Matrix4::identity() * uncertainty.noise_px2),
+            .copy_from(&(by_b * shift_b));
+        // The gap, with its sign, runs from the first ray to the second along the common normal.
+        let normal = ray_a.direction.cross(&ray_b.direction).normalize();
+        let (away, toward) = (shift_a.tr_mul(&normal), shift_b.tr_mul(&normal));
+        Some(SeenPair {
+            uncertainty,
+            pixel: a.1,
+            by_pixels,
+            gap_mm: found.gap_mm,
+            gap_by_pixels: Vector4::new(-away.x, -away.y, toward.x, toward.y),
         })
     }
 

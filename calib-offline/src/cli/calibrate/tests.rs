@@ -35,6 +35,7 @@ fn args(folder: &Path) -> CalibrateArgs {
         method: MethodArg::Joint,
         exclude: vec![3, 17],
         ray_tables: false,
+        match_noise_px: None,
         force: false,
     }
 }

@@ -138,6 +138,7 @@ pub fn rig() -> Rig {
         uncertainty: Vec::new(),
         cameras: cameras.into(),
         datum_pose: 0,
+        match_noise_px: None,
     }
 }
 

@@ -1,5 +1,6 @@
 //! Why a frame or a request was refused: facts on the wire, words and the next step in `Display`.
 
+use ray_runtime::MatchNoise;
 use serde::{Deserialize, Serialize};
 
 /// Why a frame or a request was refused.
@@ -96,6 +97,8 @@ pub enum Refusal {
     NotSigned,
     /// The signature is not that of the device's key over these bytes.
     BadSignature,
+    /// The noise of matches is not in the range of the runtime's `MatchNoise`.
+    BadNoise,
 }
 
 /// What of a camera, or of the rig, is not the device's.
@@ -177,6 +180,9 @@ impl core::fmt::Display for Refusal {
                         "the blob is of a format version that the device does not read: bring its firmware up to date, or pack for that version"
                     }
                     5 => "the blob was damaged before it was sent: pack it again",
+                    15 => {
+                        "the blob says what a device must know to measure with it, and this one does not: bring its firmware up to date"
+                    }
                     _ => "what was sent cannot be opened as a blob: pack it again",
                 };
                 write!(out, "{reason} (code {open_error})")
@@ -222,6 +228,12 @@ impl core::fmt::Display for Refusal {
             Self::BadSignature => write!(
                 out,
                 "the signature is not of this blob, or not by the key that the device was built for: nothing was taken"
+            ),
+            Self::BadNoise => write!(
+                out,
+                "the noise of matches must be 0 or {} to {} px: give it so",
+                MatchNoise::LEAST_PX,
+                MatchNoise::MOST_PX
             ),
         }
     }
