@@ -148,6 +148,10 @@ int example(void)
             print_bits(&measurement.gap_squared_mm2, 1);
             print_bits(measurement.sigma_mm, measurement.has_sigma ? 3 : 0);
         }
+        if (code == RAYS_OK && k % 32 == 0) {
+            print_code(code = rays_triangulate_with_noise(&rig, first, second, 0.375f, &measurement));
+            print_bits(measurement.sigma_mm, measurement.has_sigma ? 3 : 0);
+        }
         print("\n");
     }
     return 0;

@@ -31,13 +31,15 @@ enum {
     RAYS_TRAILING_BYTES = 4,   /* more bytes than it says it has: see rays_stated_len */
     RAYS_BAD_CRC = 5,          /* damaged on the way */
     RAYS_MISALIGNED = 6,       /* not at a multiple of 8 */
-    RAYS_BAD_HEADER = 7,       /* 7 to 13: not what FORMAT.md says, though the checksum fits */
+    RAYS_BAD_HEADER = 7,       /* 7 to 14: not what FORMAT.md says, though the checksum fits */
     RAYS_BAD_META = 8,
     RAYS_BAD_PADDING = 9,
     RAYS_UNKNOWN_ENCODING = 10,
     RAYS_BAD_LAYOUT = 11,
     RAYS_BAD_NUMBER = 12,
     RAYS_BAD_PAIR = 13,
+    RAYS_BAD_SECTION = 14,
+    RAYS_UNKNOWN_SECTION = 15, /* it says what must be understood to answer rightly, and this library does not */
 
     /* Why a question has no answer. */
     RAYS_OUTSIDE = 64,         /* a pixel outside of its camera's calibrated area, or not a number */
@@ -51,7 +53,7 @@ enum {
     RAYS_NOT_ON_SENSOR = 71,   /* an empty image, a binning of 0, or more than the sensor has */
 
     /* Of this interface. */
-    RAYS_BAD_ARGUMENT = 128,   /* a null pointer, or a length that no object has */
+    RAYS_BAD_ARGUMENT = 128,   /* a null pointer, or a length or a noise that there is not */
     RAYS_NOT_OPEN = 129,       /* the rig was not opened, or could not be */
     RAYS_SELF_TEST_FAILED = 130
 };
@@ -141,6 +143,14 @@ int rays_triangulate(const rays_rig *rig, rays_sighting first, rays_sighting sec
 /* About four times the work of rays_triangulate, whose bits the point has. */
 int rays_triangulate_with_covariance(const rays_rig *rig, rays_sighting first, rays_sighting second,
                                      rays_measurement *measurement);
+
+/* The same of pixels whose coordinates have the standard deviation noise_px, whatever the blob says of them: 0, or 1e-6 to 1000. */
+int rays_triangulate_with_noise(const rays_rig *rig, rays_sighting first, rays_sighting second, float noise_px,
+                                rays_measurement *measurement);
+
+/* How noisy the blob says that the pixels of matches are; *noise_px becomes -1 where it says nothing, and they are taken to be as
+ * exact as the corners of the calibration. */
+int rays_match_noise(const rays_rig *rig, float *noise_px);
 
 /* The pixel of a camera that sees a point of the rig's frame, to some 0.001 px; it costs 25 lookups and about ten for each of
  * some six steps. */

@@ -15,7 +15,7 @@ use core::ffi::c_int;
 use core::mem::MaybeUninit;
 use nalgebra::Vector3;
 use ray_runtime::{
-    MeasureError, OpenError, PixelPoint, ProjectError, RayBlob, Readout, SensorWindow,
+    MatchNoise, MeasureError, OpenError, PixelPoint, ProjectError, RayBlob, Readout, SensorWindow,
 };
 
 pub use types::{Camera, CameraReadout, CurvePoint, Measurement, Pixel, Point, Ray, Sighting};
@@ -190,18 +190,48 @@ pub unsafe extern "C" fn rays_triangulate_with_covariance(
 ) -> c_int {
     let ask = |blob: &RayBlob<'_>| {
         let measured = blob.triangulate_with_covariance(first.of_rust(), second.of_rust());
-        measured.map_err(MeasureError::code).map(|measured| {
-            let sigma_mm = measured.covariance.map(|covariance| covariance.sigma_mm());
-            Measurement {
-                point_mm: measured.found.point_mm.into(),
-                gap_squared_mm2: measured.found.gap_squared_mm2,
-                sigma_mm: sigma_mm.unwrap_or_default(),
-                has_sigma: sigma_mm.is_some().into(),
-            }
-        })
+        measured
+            .map_err(MeasureError::code)
+            .map(Measurement::of_rust)
     };
     // SAFETY: both are null or what they should be, says the caller.
     unsafe { answer(rig, measurement, ask) }
+}
+
+/// The same with the noise of the pixels.
+///
+/// # Safety
+/// As `rays.h` says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rays_triangulate_with_noise(
+    rig: *const Rig,
+    first: Sighting,
+    second: Sighting,
+    noise_px: f32,
+    measurement: *mut Measurement,
+) -> c_int {
+    let Some(noise) = MatchNoise::from_px(noise_px) else {
+        return BAD_ARGUMENT;
+    };
+    let ask = |blob: &RayBlob<'_>| {
+        let measured = blob.triangulate_with_noise(first.of_rust(), second.of_rust(), noise);
+        measured
+            .map_err(MeasureError::code)
+            .map(Measurement::of_rust)
+    };
+    // SAFETY: both are null or what they should be, says the caller.
+    unsafe { answer(rig, measurement, ask) }
+}
+
+/// How noisy the blob says that matches are.
+///
+/// # Safety
+/// As `rays.h` says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rays_match_noise(rig: *const Rig, noise_px: *mut f32) -> c_int {
+    let ask = |blob: &RayBlob<'_>| Ok(blob.match_noise().map_or(-1.0, MatchNoise::px));
+    // SAFETY: both are null or what they should be, says the caller.
+    unsafe { answer(rig, noise_px, ask) }
 }
 
 /// The pixel that sees a point.

@@ -69,6 +69,18 @@ pub struct Measurement {
     pub(crate) has_sigma: c_int,
 }
 
+impl Measurement {
+    pub(crate) fn of_rust(measured: ray_runtime::Measurement) -> Self {
+        let sigma_mm = measured.covariance.map(|covariance| covariance.sigma_mm());
+        Self {
+            point_mm: measured.found.point_mm.into(),
+            gap_squared_mm2: measured.found.gap_squared_mm2,
+            sigma_mm: sigma_mm.unwrap_or_default(),
+            has_sigma: sigma_mm.is_some().into(),
+        }
+    }
+}
+
 impl From<PixelPoint> for Pixel {
     fn from(pixel: PixelPoint) -> Self {
         Self {

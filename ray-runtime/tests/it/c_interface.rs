@@ -2,8 +2,9 @@
 //! host and, where a cross compiler is there, on Arm in QEMU, with an FPU and without; a panic would not link.
 
 use ray_runtime::{
-    Aligned, EpipolarCurve, LookupError, MeasureError, Measurement, OpenError, PixelPoint,
-    ProjectError, Ray, RayBlob, Readout, ReadoutError, SensorWindow, Table, Triangulation,
+    Aligned, EpipolarCurve, LookupError, MatchNoise, MeasureError, Measurement, OpenError,
+    PixelPoint, ProjectError, Ray, RayBlob, Readout, ReadoutError, SensorWindow, Table,
+    Triangulation,
 };
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -146,6 +147,12 @@ fn expected(blob: &RayBlob<'_>) -> (String, usize) {
             [of_point(measured.found), sigma_mm.unwrap_or_default()].concat()
         };
         text += &field(measured.map(of_measurement).map_err(MeasureError::code));
+        if measured.is_ok() && number % 32 == 0 {
+            let noise = MatchNoise::from_px(0.375).unwrap();
+            let noisy = blob.triangulate_with_noise(first, second, noise).unwrap();
+            let sigma_mm = noisy.covariance.map(|c| c.sigma_mm().to_vec());
+            text += &field(Ok(sigma_mm.unwrap_or_default()));
+        }
         text.push('\n');
     }
     (text, points)
@@ -263,6 +270,8 @@ fn codes_of_the_header_are_those_of_rust() {
             },
         ),
         ("BAD_PAIR", OpenError::BadPair { pair: 0 }),
+        ("BAD_SECTION", OpenError::BadSection { section: 0 }),
+        ("UNKNOWN_SECTION", OpenError::UnknownSection { tag: 0 }),
     ];
     let measure = [
         ("OUTSIDE", MeasureError::Outside { camera: 0 }),

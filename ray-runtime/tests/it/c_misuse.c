@@ -87,6 +87,13 @@ int main(int count, char **arguments)
     first.camera = 0;
     EXPECT(rays_triangulate_with_covariance(&rig, first, second, &measurement), RAYS_OK);
     EXPECT(measurement.has_sigma, 1);
+    EXPECT(rays_triangulate_with_noise(&rig, first, second, -1.0f, &measurement), RAYS_BAD_ARGUMENT);
+    EXPECT(rays_triangulate_with_noise(&rig, first, second, 0.5f, NULL), RAYS_BAD_ARGUMENT);
+    EXPECT(rays_triangulate_with_noise(&rig, first, second, 0.5f, &measurement), RAYS_OK);
+    float noise_px = 7.0f;
+    EXPECT(rays_match_noise(&rig, NULL), RAYS_BAD_ARGUMENT);
+    EXPECT(rays_match_noise(&rig, &noise_px), RAYS_OK);
+    EXPECT(noise_px == -1.0f, 1);
 
     /* Cameras, projections, curves, windows. */
     rays_camera camera;

@@ -84,7 +84,7 @@ fn flips_are_refused(form: Form) {
         let error = refused(bytes.bytes());
         let fits = match bit / 8 {
             0..4 => matches!(error, OpenError::BadMagic { .. }),
-            // One bit away from version 3 there is version 2.
+            // A bit away from one version there may be another.
             4..6 => matches!(
                 error,
                 OpenError::WrongVersion { .. } | OpenError::BadCrc { .. }
@@ -153,7 +153,11 @@ fn each_part_of_the_header_is_judged() {
     );
     assert_eq!(refused_with(20, &0u16.to_le_bytes()), OpenError::BadHeader);
     assert_eq!(refused_with(20, &65u16.to_le_bytes()), OpenError::BadHeader);
-    assert_eq!(refused_with(22, &0u16.to_le_bytes()), OpenError::BadHeader);
+    // Then the pair would be a section.
+    assert_eq!(
+        refused_with(22, &0u16.to_le_bytes()),
+        OpenError::BadSection { section: 0 }
+    );
     assert_eq!(
         refused_with(22, &2u16.to_le_bytes()),
         OpenError::BadPair { pair: 1 }
@@ -415,7 +419,7 @@ fn each_part_of_a_pair_is_judged() {
     );
     assert!(matches!(
         refused_with(start + 4, &[2, 0]),
-        OpenError::BadPadding { .. } | OpenError::BadHeader
+        OpenError::BadPadding { .. } | OpenError::BadSection { .. }
     ));
     // Any node is a factor of some covariance.
     let mut any = sample();

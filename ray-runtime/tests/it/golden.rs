@@ -1,4 +1,4 @@
-//! Exact bytes: the golden blobs of versions 1 and 2 are read as on the day they were written.
+//! Exact bytes: the golden blobs of versions 1, 2 and 4 are read as on the day they were written.
 
 use ray_runtime::format::{self, Encoding, HEADER_LEN, Header, MAGIC, RECORD_LEN, Record};
 use ray_runtime::{Aligned, LookupError, MeasureError, PixelPoint, RayBlob, Region};
@@ -161,3 +161,32 @@ fn version_1_has_no_uncertainty() {
     assert_eq!(Ok(measured.found), blob.triangulate((0, a), (1, b)));
     assert_eq!(measured.covariance, None);
 }
+
+static GOLDEN_4: &Aligned<[u8]> =
+    &Aligned(*include_bytes!("../../../data/golden/stereo-v4-small.rays"));
+
+#[test]
+fn version_4_has_the_noise_of_matches_behind_the_pair() {
+    let bytes = &GOLDEN_4.0;
+    assert_eq!(bytes[..8], [b'R', b'A', b'Y', b'S', 4, 0, 24, 0]);
+    let (_, header) = Header::read(bytes).unwrap();
+    assert_eq!(header.total_len as usize, bytes.len());
+    // Computed by zlib over all bytes but these four.
+    assert_eq!(header.crc, 0x94b3_3ecd);
+    // Tag 1, not required, four bytes, 0.375, and zeros up to the next multiple of 8: the end of the blob.
+    let section = bytes.len() - 16;
+    assert_eq!(bytes[section..section + 8], [1, 0, 0, 0, 4, 0, 0, 0]);
+    assert_eq!(bytes[section + 8..section + 12], 0.375f32.to_le_bytes());
+    assert_eq!(bytes[section + 12..], [0; 4]);
+    let blob = RayBlob::open(bytes).unwrap();
+    assert_eq!(blob.run_self_tests(), Ok(10));
+    assert_eq!(blob.match_noise().map(|noise| noise.px()), Some(0.375));
+    let (a, b) = (PixelPoint::new(30.0, 20.5), PixelPoint::new(33.0, 21.0));
+    let measured = blob.triangulate_with_covariance((0, a), (1, b)).unwrap();
+    let sigma_mm = measured.covariance.unwrap().sigma_mm();
+    assert_eq!(sigma_mm.map(f32::to_bits), SIGMA_4);
+}
+
+// From a separate evaluation of FORMAT.md's formulas in Python with f32 arithmetic:
+// 2.5705, 2.4990 and 9.4449 mm.
+const SIGMA_4: [u32; 3] = [0x4024_8291, 0x401f_ef89, 0x4117_1e81];

@@ -6,5 +6,6 @@ mod document;
 mod golden;
 mod project;
 mod questions;
+mod sections;
 mod test_blob;
 mod uncertainty;

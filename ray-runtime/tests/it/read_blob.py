@@ -58,7 +58,7 @@ def table(blob, record, pixel):  # s1, s2 and, if the camera is not central, n1,
             found.append(polynomial(rest[c::2], x[0] * scale[0] - 1, x[1] * scale[1] - 1))
             if size > 0:
                 found[-1] += small(unit[k], axes, places, knots(("<b", "<h")[size - 1], first + size * c, 2 * size))
-        first = (first + 2 * size * (cells_u + 3) * (cells_v + 3) + 7) // 8 * 8
+        first = aligned(first + 2 * size * (cells_u + 3) * (cells_v + 3))
     return found
 def ray(blob, record, pixel):
     (s1, s2, *n), pose = table(blob, record, pixel), numbers(blob, record + 80, 12)
@@ -73,16 +73,36 @@ def match(o1, d1, o2, d2):
     w, k = [b - a for a, b in zip(o1, o2)], 1 / dot(n := cross(d1, d2), n)
     l1, l2 = dot(cross(w, d2), n) * k, dot(cross(w, d1), n) * k
     return *(((a + b * l1) + (c + d * l2)) * 0.5 for a, b, c, d in zip(o1, d1, o2, d2)), dot(w, n) * dot(w, n) * k
+def aligned(at):
+    return (at + 7) // 8 * 8
+def sections(blob, at, pairs, version):  # what is known of those behind the pairs: how noisy matches are, px
+    for _ in range(pairs):
+        nodes_u, nodes_v = struct.unpack_from("<2H", blob, at + 4)
+        at = aligned(at + 32 + 11 * nodes_u * nodes_v)
+    found, last, count = None, 0, 0
+    require(version > 3 or at == len(blob), "bytes behind the pairs")
+    while at < len(blob):
+        tag, flags, length = struct.unpack_from("<HHI", blob, at)
+        start, at, count = at + 8, aligned(at + 8 + length), count + 1
+        require(last < tag and flags <= 1 and at <= len(blob) and count <= 64, "a section that is not in order")
+        require(not any(blob[start + length:at]), "padding that is not zero")
+        require(tag == 1 or flags == 0, f"a section {tag} that must be understood")
+        if tag == 1:
+            require(length == 4 and ((found := numbers(blob, start, 1)[0]) == 0 or 1e-6 <= found <= 1e3), "no noise")
+        last = tag
+    return found
 
 def main(blob):
     magic, version, *lengths, crc, meta_len, cameras, pairs = struct.unpack_from("<4sHHIIIHH", blob)
-    require(magic == b"RAYS" and 1 <= version <= 3, "no blob of version 1 to 3")
+    require(magic == b"RAYS" and 1 <= version <= 4, "no blob of version 1 to 4")
     require(lengths == [24, len(blob)] and crc == zlib.crc32(blob[16:], zlib.crc32(blob[:12])), "damaged")
-    meta, first_record, kinds, wrong = io.BytesIO(blob[24:24 + meta_len]), (24 + meta_len + 7) // 8 * 8, [0, 0, 0], 0
+    meta, first_record, kinds, wrong = io.BytesIO(blob[24:24 + meta_len]), aligned(24 + meta_len), [0, 0, 0], 0
     print(version, pairs, *(meta.read(integer(meta)) for _ in range(3)), integer(meta), integer(meta))
     print(*numbers(meta.read(8), 0, 2), test_count := integer(meta))
     for at in range(first_record, first_record + 128 * cameras, 128):
-        print(meta.read(integer(meta)), [integer(meta) for _ in range(6)], struct.unpack_from("<5I", blob, at))
+        fields = struct.unpack_from("<7I", blob, at)
+        print(meta.read(integer(meta)), [integer(meta) for _ in range(6)], fields)
+    print("noise", sections(blob, aligned(fields[6] + (fields[3] * fields[4] + 7) // 8), pairs, version))
     for kind in (integer(meta) for _ in range(test_count)):
         records, kinds[kind] = [first_record + 128 * integer(meta) for _ in range(min(kind, 1) + 1)], kinds[kind] + 1
         rays = [a for record in records for a in ray(blob, record, numbers(meta.read(8), 0, 2))]

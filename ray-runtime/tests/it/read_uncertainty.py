@@ -2,7 +2,7 @@
 self-tests of variant 2 give the stated bits. Usage: read_uncertainty.py RIG.rays; exit code 1 if a bit differs."""
 import io, math, struct, sys
 import read_blob
-from read_blob import F, blend, cross, dot, integer, numbers, ray, table, weights
+from read_blob import F, blend, cross, dot, integer, numbers, ray, sections, table, weights
 
 class D(F):
     """An f32 with its derivatives by u and by v, found beside it."""
@@ -87,7 +87,7 @@ def factor(blob, at, pixel):
     rows = [between(c[0], node(i[0], i[1] + j), node(i[0] + 1, i[1] + j)) for j in (0, 1)]
     return [a * number[4] for a in between(c[1], *rows)], number[5]
 
-def sigma(blob, pairs, records, cameras, pixels):
+def sigma(blob, pairs, records, cameras, pixels, match_noise):
     rays = [ray(blob, record, pixel) for record, pixel in zip(records, pixels)]
     (o1, d1), (o2, d2) = rays
     w, n = [b - a for a, b in zip(o1, o2)], cross(d1, d2)
@@ -101,6 +101,7 @@ def sigma(blob, pairs, records, cameras, pixels):
     pair, is_swapped = pair_of(blob, pairs, cameras)
     j = columns[2:] + columns[:2] if is_swapped else columns
     (l11, l21, l22, l31, l32, l33, l41, l42, l43, l44), noise = factor(blob, pair, pixels[is_swapped])
+    noise = noise if match_noise is None else match_noise * match_noise
     variances = []
     for i in range(3):
         a, b, c, d = (column[i] for column in j)
@@ -109,7 +110,7 @@ def sigma(blob, pairs, records, cameras, pixels):
     return [F(math.sqrt(a)) for a in variances]
 
 def main(blob):
-    *_, meta_len, camera_count, _ = struct.unpack_from("<4sHHIIIHH", blob)
+    _, version, *_, meta_len, camera_count, pair_count = struct.unpack_from("<4sHHIIIHH", blob)
     meta, first_record = io.BytesIO(blob[24:24 + meta_len]), (24 + meta_len + 7) // 8 * 8
     for _ in range(3):
         meta.read(integer(meta))
@@ -121,6 +122,7 @@ def main(blob):
             integer(meta)
     last = struct.unpack_from("<8I", blob, first_record + 128 * (camera_count - 1))
     pairs = (last[6] + (last[3] * last[4] + 7) // 8 + 7) // 8 * 8
+    match_noise = sections(blob, pairs, pair_count, version)
     count = wrong = 0
     for _ in range(test_count):
         kind = integer(meta)
@@ -128,7 +130,7 @@ def main(blob):
         pixels = [numbers(meta.read(8), 0, 2) for _ in cameras]
         stated = meta.read((24, 16, 12)[kind])
         if kind == 2:
-            found = sigma(blob, pairs, [first_record + 128 * camera for camera in cameras], cameras, pixels)
+            found = sigma(blob, pairs, [first_record + 128 * camera for camera in cameras], cameras, pixels, match_noise)
             count, wrong = count + 1, wrong + (struct.pack("<3f", *found) != stated)
     print(f"{count} uncertainties, {wrong} with other bits")
     return wrong

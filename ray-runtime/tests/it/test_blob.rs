@@ -2,8 +2,8 @@
 
 use ray_runtime::format::{
     self, Axis, CameraMeta, Encoding, Form, HEADER_LEN, Header, LengthUnit, Meta, PLACES_PER_CELL,
-    PairHeader, PixelConvention, QuantizedHeader, QuantizedMap, RECORD_LEN, RecordFields, SelfTest,
-    UNITS_PER_STEP, VERSION,
+    PairHeader, PixelConvention, QuantizedHeader, QuantizedMap, RECORD_LEN, RecordFields,
+    SectionHeader, SelfTest, UNITS_PER_STEP, VERSION,
 };
 
 /// Bytes that start on a multiple of 8.
@@ -276,6 +276,8 @@ impl TestPair {
 pub struct TestBlob {
     pub cameras: Vec<TestCamera>,
     pub pairs: Vec<TestPair>,
+    /// Sections with their contents, behind each of which zeros are added.
+    pub sections: Vec<(SectionHeader, Vec<u8>)>,
     pub max_error_px: f32,
     pub identity: Vec<u8>,
     pub self_tests: Vec<SelfTest>,
@@ -286,6 +288,7 @@ impl TestBlob {
         Self {
             cameras,
             pairs: Vec::new(),
+            sections: Vec::new(),
             max_error_px: 0.001,
             identity: (0..16).collect(),
             self_tests: Vec::new(),
@@ -341,6 +344,11 @@ impl TestBlob {
         }
         for pair in &self.pairs {
             tables.extend(pair.bytes());
+            pad(&mut tables);
+        }
+        for (header, content) in &self.sections {
+            tables.extend(header.to_bytes());
+            tables.extend(content);
             pad(&mut tables);
         }
         let header = Header {

@@ -305,6 +305,7 @@ fn parts() -> encode::BlobParts<'static> {
         working_distance_mm: 600.0,
         self_tests: Vec::new(),
         pairs: Vec::new(),
+        match_noise: None,
     }
 }
 

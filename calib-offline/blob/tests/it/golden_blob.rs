@@ -1,6 +1,7 @@
-//! The golden blobs of format version 3: the packer writes today what it wrote then.
+//! The golden blobs of format versions 3 and 4: the packer writes today what it wrote then. Version 4 is
+//! version 3 but for its number, and for sections where there are any.
 //!
-//! `UPDATE_GOLDEN=1 cargo test --release -p calib-blob --test it golden_blob` writes the files
+//! `UPDATE_GOLDEN=1 cargo test --release -p calib-blob --test it golden_blob` writes those of version 4
 //! anew. That is right only if the packer was meant to change; a new format version gets a file
 //! of its own, and the old one stays.
 
@@ -13,7 +14,9 @@ use calib_rays::field::{
 use calib_rays::geometry::{PixelPoint, RigidTransform, SensorSize};
 use nalgebra::{Matrix3, Matrix4, Vector2, Vector3};
 use ray_runtime::RayBlob;
-use ray_runtime::format::{self, HEADER_LEN, Header, QuantizedHeader, RECORD_LEN};
+use ray_runtime::format::{
+    self, CRC_OFFSET, HEADER_LEN, Header, QuantizedHeader, RECORD_LEN, VERSION,
+};
 use std::path::Path;
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/golden");
@@ -112,11 +115,15 @@ fn the_packer_still_writes_the_golden_blobs() {
         (&central, "central"),
         (&non_central, "non-central"),
     ] {
-        still_writes(rig, &format!("{name}-v3-small.rays"), Prefer::Size);
-        still_writes(rig, &format!("{name}-v3-fast.rays"), Prefer::Speed);
+        still_writes(rig, 3, &format!("{name}-v3-small.rays"), Prefer::Size);
+        still_writes(rig, 3, &format!("{name}-v3-fast.rays"), Prefer::Speed);
     }
+    let mut noisy = golden_rig();
+    noisy.match_noise_px = Some(0.375);
+    still_writes(&noisy, 4, "stereo-v4-small.rays", Prefer::Size);
+    still_writes(&noisy, 4, "stereo-v4-fast.rays", Prefer::Speed);
     let cubic = "non-central-v3-cubic.rays";
-    still_writes(&cubic_rig(), cubic, Prefer::Size);
+    still_writes(&cubic_rig(), 3, cubic, Prefer::Size);
     let bytes = read_aligned(&Path::new(FOLDER).join(cubic)).unwrap();
     for table in quantized_tables(&bytes) {
         let (direction, offset) = (table.direction, table.offset);
@@ -155,23 +162,30 @@ fn quantized_tables(bytes: &[u8]) -> Vec<QuantizedHeader> {
         .collect()
 }
 
-fn still_writes(rig: &Rig, name: &str, prefer: Prefer) {
+fn still_writes(rig: &Rig, version: u16, name: &str, prefer: Prefer) {
     let path = Path::new(FOLDER).join(name);
     let settings = PackSettings {
         max_error_px: 0.002,
         working_distance_mm: 500.0,
-        identity: *b"golden stereo v3",
+        identity: *match version {
+            3 => b"golden stereo v3",
+            _ => b"golden stereo v4",
+        },
         prefer,
         ..PackSettings::default()
     };
-    let packed = pack(rig, &settings).unwrap();
-    if std::env::var_os("UPDATE_GOLDEN").is_some() {
-        std::fs::write(&path, &packed.bytes).unwrap();
+    let mut packed = pack(rig, &settings).unwrap().bytes;
+    if version < VERSION {
+        packed[4..6].copy_from_slice(&version.to_le_bytes());
+        let crc = format::checksum(&packed).unwrap().to_le_bytes();
+        packed[CRC_OFFSET..CRC_OFFSET + 4].copy_from_slice(&crc);
+    } else if std::env::var_os("UPDATE_GOLDEN").is_some() {
+        std::fs::write(&path, &packed).unwrap();
     }
     let golden = read_aligned(&path).unwrap();
     let (golden, now) = (
         RayBlob::open(&golden).unwrap(),
-        AlignedBytes::from(packed.bytes.as_slice()),
+        AlignedBytes::from(packed.as_slice()),
     );
     // The program's version stands in the blob; what it computes must not depend on it.
     let fresh = RayBlob::open(&now).unwrap();
@@ -186,8 +200,9 @@ fn still_writes(rig: &Rig, name: &str, prefer: Prefer) {
     }
     assert!(golden.self_tests().eq(fresh.self_tests()));
     assert!(golden.uncertain_pairs().eq(fresh.uncertain_pairs()));
+    assert_eq!(golden.match_noise(), fresh.match_noise());
     assert_eq!(golden.max_error_px(), fresh.max_error_px());
     if golden.written_by() == fresh.written_by() {
-        assert_eq!(std::fs::read(path).unwrap(), packed.bytes);
+        assert_eq!(std::fs::read(path).unwrap(), packed);
     }
 }
