@@ -8,6 +8,7 @@
 //! Shares `geometry`, `board` and the corner types of `dataset` with the estimator, and nothing
 //! else: a mistake in the ray field cannot hide in both.
 
+mod displaced;
 mod error;
 pub mod faults;
 mod images;

@@ -84,7 +84,7 @@ impl Scene {
     }
 
     /// Noise of every corner of a view, row by row.
-    fn noise_px(&self, camera_idx: usize, pose: usize) -> Vec<[f64; 2]> {
+    pub(super) fn noise_px(&self, camera_idx: usize, pose: usize) -> Vec<[f64; 2]> {
         let settings = &self.settings;
         let (rows, cols) = (settings.board.rows, settings.board.cols);
         let mut rng = random::stream(settings.seed, Purpose::Noise, camera_idx, pose);

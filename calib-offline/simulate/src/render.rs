@@ -7,6 +7,7 @@
 //! exact ray this is wrong by less than 1e-3 px on all optics here (tested), and where the lattice
 //! has a hole, at the border of an image circle, each cell has its exact ray.
 
+use super::displaced::Displaced;
 use super::optics::CameraOptics;
 use super::pattern::Pattern;
 use super::random::{self, Purpose};
@@ -41,6 +42,9 @@ pub struct RenderSettings {
     pub gradient: [f64; 2],
     /// Standard deviation of the sensor's noise, in levels of an 8-bit image.
     pub noise_levels: f64,
+    /// Whether every corner of the board is drawn off by its noise, as it would be in `corners.csv`.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_displaced: bool,
 }
 
 impl Default for RenderSettings {
@@ -52,6 +56,7 @@ impl Default for RenderSettings {
             background: 0.30,
             gradient: [0.15, -0.10],
             noise_levels: 1.0,
+            is_displaced: false,
         }
     }
 }
@@ -98,6 +103,8 @@ pub struct PlateView<'a> {
     /// Height (along the plate's z) of its outermost corners over its middle, mm; see
     /// [`super::SceneSettings::bow_mm`]. Only for chessboards.
     pub bow_mm: f64,
+    /// By how much its print is displaced, if it is.
+    pub displaced: Option<Displaced>,
 }
 
 impl PlateView<'_> {
@@ -230,7 +237,11 @@ impl PlateView<'_> {
         let Some(cell) = cell else {
             return value(None);
         };
-        let center = self.pattern.shade(cell.point.x, cell.point.y);
+        let middle = match &self.displaced {
+            Some(displaced) => cell.point - displaced.at(&cell.point),
+            None => cell.point,
+        };
+        let center = self.pattern.shade(middle.x, middle.y);
         if center.edge_mm > cell.reach_mm {
             return value(center.ink);
         }
@@ -241,7 +252,7 @@ impl PlateView<'_> {
         let mut sum = 0.0;
         for j in 0..SAMPLES {
             for i in 0..SAMPLES {
-                let point = cell.point + cell.by_u * offset(i) + cell.by_v * offset(j);
+                let point = middle + cell.by_u * offset(i) + cell.by_v * offset(j);
                 let shade = self.pattern.shade(point.x, point.y);
                 let across = (0.5 - 0.5 * shade.edge_mm / half_mm).max(0.0) as f32;
                 sum += value(shade.ink) * (1.0 - across) + value(shade.beyond) * across;

@@ -13,6 +13,7 @@ const PERFECT: RenderSettings = RenderSettings {
     background: 0.3,
     gradient: [0.0, 0.0],
     noise_levels: 0.0,
+    is_displaced: false,
 };
 
 fn scene(optics: OpticsKind) -> Scene {
@@ -30,6 +31,7 @@ fn board_view(scene: &Scene, camera_idx: usize, pose: usize) -> PlateView<'_> {
         camera_from_plate: scene.left_from_camera[camera_idx].inverse() * scene.true_poses[pose],
         pattern: Pattern::Chessboard(scene.settings.board),
         bow_mm: scene.settings.bow_mm,
+        displaced: None,
     }
 }
 
@@ -167,6 +169,7 @@ fn ring_centers_lie_where_a_small_ring_says() {
         ),
         pattern: Pattern::RingTarget,
         bow_mm: 0.0,
+        displaced: None,
     };
     let image = view.render(&PERFECT);
     for (row, col) in [(0, 0), (3, 4), (1, 2), (6, 8)] {
@@ -265,4 +268,53 @@ fn outside_the_image_circle_there_is_background() {
     assert!((image.brightness[0] - 0.3).abs() < 1e-6);
     let brightest = image.brightness.iter().copied().fold(0.0, f32::max);
     assert!(brightest > 0.85, "the board is in view: {brightest}");
+}
+
+/// Displaced by 0.05 px, a corner is seen where its noise puts it: the print around it goes with it.
+#[test]
+fn displaced_corners_are_off_by_their_noise() {
+    let mut scene = scene(OpticsKind::Brown);
+    scene.settings.noise_px = 0.05;
+    let displaced = RenderSettings {
+        is_displaced: true,
+        ..PERFECT
+    };
+    let [clean, image] = [&PERFECT, &displaced].map(|settings| scene.render_board(0, 0, settings));
+    let views = scene.observe_corners();
+    let view = views
+        .iter()
+        .find(|view| (view.camera_idx, view.pose) == (0, 0))
+        .unwrap();
+    let (mut along, mut squares, mut rest, mut count) = (0.0, 0.0, 0.0, 0);
+    for corner in &view.corners {
+        let truth = scene.true_corner(0, 0, corner.row, corner.col).unwrap();
+        if truth.u < 15.0 || truth.u > 785.0 || truth.v < 15.0 || truth.v > 625.0 {
+            continue;
+        }
+        let [before, after] = [&clean, &image].map(|image| symmetry_center(image, truth, 3));
+        for (noise, found) in [
+            (corner.pixel.u - truth.u, after.u - before.u),
+            (corner.pixel.v - truth.v, after.v - before.v),
+        ] {
+            along += noise * found;
+            squares += noise * noise;
+            rest += (noise - found).powi(2);
+            count += 1;
+        }
+    }
+    assert!(count > 200);
+    // What is left of it: the place around a corner that is level is some tenths of a square, and the window that
+    // finds it is 7 px wide and as much again by the blur.
+    assert!((along / squares - 1.0).abs() < 0.1, "{}", along / squares);
+    assert!(
+        (rest / squares).sqrt() < 0.15,
+        "{}",
+        (rest / squares).sqrt()
+    );
+    // The noise is that of `corners.csv`, from the same stream.
+    let sd_px = (squares / f64::from(count)).sqrt();
+    assert!(
+        (sd_px / 0.05 - 1.0).abs() < 4.0 / f64::from(2 * count).sqrt(),
+        "{sd_px}"
+    );
 }

@@ -1,5 +1,6 @@
 //! A stereo rig before a chessboard on a rotation stage, and what its cameras record.
 
+use super::displaced::Displaced;
 use super::optics::CameraOptics;
 use super::pattern::Pattern;
 use super::preset::{self, RigPreset};
@@ -179,17 +180,37 @@ impl Scene {
         settings: &RenderSettings,
     ) -> Rendered {
         let camera_from_left = self.left_from_camera[camera_idx].inverse();
-        let view = PlateView {
+        let mut view = PlateView {
             camera: &self.cameras[camera_idx],
             camera_from_plate: camera_from_left * self.exposed_pose(camera_idx, pose),
             pattern: Pattern::Chessboard(self.settings.board),
             bow_mm: self.settings.bow_mm,
+            displaced: None,
         };
+        if settings.is_displaced {
+            view.displaced = Some(self.displaced(camera_idx, pose, &view));
+        }
         let mut image = view.render(settings);
         if settings.noise_levels > 0.0 {
             image.add_noise(settings.noise_levels, self.settings.seed, camera_idx, pose);
         }
         image
+    }
+
+    /// What moves the image of every corner by its noise; a corner that is not seen stays where it is.
+    fn displaced(&self, camera_idx: usize, pose: usize, view: &PlateView<'_>) -> Displaced {
+        let board = self.settings.board;
+        let left_from_board = self.exposed_pose(camera_idx, pose);
+        let displacement_mm = |k: usize, [du, dv]: [f64; 2]| {
+            let corner = self.corner_in_board(k / board.cols, k % board.cols);
+            let clean = self.project_board_point(camera_idx, &left_from_board, &corner)?;
+            let seen = view.plate_point(PixelPoint::new(clean.u + du, clean.v + dv))?;
+            Some(seen - corner.xy())
+        };
+        let noise_px = self.noise_px(camera_idx, pose).into_iter().enumerate();
+        let corners_mm =
+            noise_px.map(|(k, noise_px)| displacement_mm(k, noise_px).unwrap_or_default());
+        Displaced::new(board, corners_mm.collect())
     }
 
     /// The ring target as a camera takes it, with the sensor noise of a stream.
@@ -208,6 +229,7 @@ impl Scene {
             camera_from_plate: camera_from_left * *left_from_target,
             pattern: Pattern::RingTarget,
             bow_mm: 0.0,
+            displaced: None,
         };
         let mut image = view.render(settings);
         image.add_noise(

@@ -102,6 +102,10 @@ pub struct SimulateArgs {
     /// With --images: write corners.csv as well
     #[arg(long, requires = "images")]
     pub corners: bool,
+    /// With --images: draw every corner off by the noise of --noise-px, smoothly in between, as unsteady air or a
+    /// shaking stand do
+    #[arg(long, requires = "images")]
+    pub displace: bool,
     /// Also render images of a measurement target
     #[arg(long, value_enum, value_name = "KIND")]
     pub target: Option<TargetKind>,
@@ -177,6 +181,7 @@ fn output_settings(args: &SimulateArgs) -> Result<OutputSettings, SimulateError>
     let render = RenderSettings {
         blur_px: in_range("--blur-px", args.blur_px, 10.0, "0 to 10 px")?,
         noise_levels: in_range("--image-noise", args.image_noise, 100.0, "0 to 100 levels")?,
+        is_displaced: args.displace,
         ..RenderSettings::default()
     };
     let image_depth = match args.bits {

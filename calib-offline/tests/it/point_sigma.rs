@@ -2,10 +2,9 @@
 //! writes with either.
 
 use crate::common::standard::standard;
-use crate::common::{SENSOR, calibration, project, run};
+use crate::common::{project, run, with_uncertainty};
 use calib_blob::matches::BlobSource;
 use calib_blob::pack::{AlignedBytes, PackSettings, pack};
-use calib_offline::report::Calibration;
 use calib_rays::field::PairUncertainty;
 use calib_rays::field::uncertainty::packed;
 use calib_rays::measure::{PointSource, RigSource};
@@ -80,22 +79,6 @@ fn a_blob_predicts_what_the_calibration_predicts_for_lenses() {
 #[test]
 fn a_blob_predicts_what_the_calibration_predicts_behind_a_port() {
     assert_agreement(OpticsKind::Port);
-}
-
-/// A calibration whose pixels are uncertain by 0.03 px alike, all four by themselves, with noise
-/// of 0.04 px: together 0.05 px.
-fn with_uncertainty() -> Calibration {
-    let mut calibration = calibration();
-    calibration.rig.uncertainty = vec![PairUncertainty {
-        first: 0,
-        second: 1,
-        sensor: SENSOR,
-        nodes_u: 3,
-        nodes_v: 2,
-        calibration_px2: vec![packed(&(Matrix4::identity() * 0.0009)); 6],
-        noise_px2: 0.0016,
-    }];
-    calibration
 }
 
 /// A folder with a calibration, a blob of it, a blob without uncertainty, and one match: the point

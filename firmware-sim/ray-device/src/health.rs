@@ -28,8 +28,8 @@ pub const MIN_POINTS: u32 = 100;
 /// averaged, a quarter larger than noise does.
 pub const MAX_SHIFT: f32 = 0.5;
 
-/// 95 % of the gaps are within 1.96 predicted standard deviations; within 1.5 times that, noise is
-/// taken to be that of the calibration's corners.
+/// 95 % of the gaps are within 1.96 predicted standard deviations; within 1.5 times that, pixels are
+/// taken to be as noisy as the prediction has them.
 pub const MAX_SPREAD: f32 = 1.5;
 
 /// Of a normal distribution, in standard deviations: what 95 % stay within.
@@ -166,8 +166,8 @@ pub struct Predicted {
     /// Mean gap in predicted standard deviations, with its sign. Noise gives 0; what the calibration
     /// itself leaves open gives some tenths.
     pub shift: f32,
-    /// What 95 % of the gaps stay within, over what 95 % should: 1 if pixels are as exact as the corners
-    /// of the calibration were.
+    /// What 95 % of the gaps stay within, over what 95 % should: 1 if pixels are as noisy as the request or the blob
+    /// says, or where neither does, as the corners of the calibration were.
     pub spread: f32,
 }
 
@@ -180,8 +180,8 @@ pub enum Verdict {
     TooFewPoints,
     /// Gaps are as predicted.
     Fits,
-    /// Gaps are larger than predicted, both ways: pixels are less exact than the calibration's corners,
-    /// some matches are wrong, or the optics have changed in places.
+    /// Gaps are larger than predicted, both ways: pixels are noisier than the prediction has them, some
+    /// matches are wrong, or the optics have changed in places.
     Scattered,
     /// Gaps open one way: the cameras have moved against each other.
     Shifted,
@@ -218,8 +218,9 @@ impl core::fmt::Display for GapReport {
             Verdict::Fits => write!(out, "the calibration still fits, as far as gaps show")?,
             Verdict::Scattered => write!(
                 out,
-                "the gaps scatter more than the calibration predicts: the pixels are less exact than its corners \
-                 were, some matches are wrong, or the optics have changed in places"
+                "the gaps scatter more than predicted: the matches are noisier than was said (or, where nothing was \
+                 said, than the calibration's corners; measure --match-noise-px says it), some of them are wrong, or the \
+                 optics have changed in places"
             )?,
             Verdict::Shifted => write!(
                 out,

@@ -6,9 +6,12 @@
 use calib_offline::report::Calibration;
 use calib_offline::report::record::{BoardShape, EstimateRecord, Grade, SCHEMA, Verdict};
 use calib_rays::board::BoardSpec;
-use calib_rays::field::{BaseLens, CalibratedCamera, CoverageMask, Projection, RayField, Rig};
+use calib_rays::field::uncertainty::packed;
+use calib_rays::field::{
+    BaseLens, CalibratedCamera, CoverageMask, PairUncertainty, Projection, RayField, Rig,
+};
 use calib_rays::geometry::{PixelPoint, RigidTransform, SensorSize, so3};
-use nalgebra::Vector3;
+use nalgebra::{Matrix4, Vector3};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -160,6 +163,22 @@ pub fn project(rig: &Rig, camera_idx: usize, point_in_rig: &Vector3<f64>) -> Pix
         center.u + FOCAL_PX * p.x / p.z,
         center.v + FOCAL_PX * p.y / p.z,
     )
+}
+
+/// A calibration whose pixels are uncertain by 0.03 px alike, all four by themselves, with noise
+/// of 0.04 px: together 0.05 px.
+pub fn with_uncertainty() -> Calibration {
+    let mut calibration = calibration();
+    calibration.rig.uncertainty = vec![PairUncertainty {
+        first: 0,
+        second: 1,
+        sensor: SENSOR,
+        nodes_u: 3,
+        nodes_v: 2,
+        calibration_px2: vec![packed(&(Matrix4::identity() * 0.0009)); 6],
+        noise_px2: 0.0016,
+    }];
+    calibration
 }
 
 /// A calibration that says no more than what the rig is.

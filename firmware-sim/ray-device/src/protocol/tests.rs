@@ -7,9 +7,9 @@ use serde::de::DeserializeOwned;
 
 use super::{
     BlobStatus, CameraStatus, Chunk, FlashOperation, Hello, MAX_CAMERAS_LISTED, MAX_CHUNK,
-    MAX_MATCHES, MAX_NAME, Match, Measured, Name, NewBlob, Point, Refusal, Reply, Request, Rig,
-    RigPart, SelfTestReport, Sighting, Signature, SlotState, Status, StoredBlob, UpdateStatus,
-    name,
+    MAX_MATCHES, MAX_NAME, Match, Measured, Name, NewBlob, NoisyMatches, Point, Refusal, Reply,
+    Request, Rig, RigPart, SelfTestReport, Sighting, Signature, SlotState, Status, StoredBlob,
+    UpdateStatus, name,
 };
 use crate::frame::{FrameWriter, MAX_MESSAGE};
 use crate::health::{GapReport, Predicted};
@@ -54,6 +54,17 @@ fn bytes_of_requests() {
         0xac, 0x02,             // id 300
         0, 0, 0, 0x80, 0x3f, 0, 0, 0, 0xc0, // camera 0 at (1, -2)
         1, 0, 0, 0, 0x3f, 0, 0, 0xc0, 0x3f, // camera 1 at (0.5, 1.5)
+    ]);
+    let noisy = NoisyMatches {
+        noise_px: 0.5,
+        matches: vec(&[asked]),
+    };
+    #[rustfmt::skip]
+    assert_bytes(&Request::MeasureNoisy(noisy), &[
+        9, 0, 0, 0, 0x3f, 1,    // measure with 0.5 px, one match
+        0xac, 0x02,
+        0, 0, 0, 0x80, 0x3f, 0, 0, 0, 0xc0,
+        1, 0, 0, 0, 0x3f, 0, 0, 0xc0, 0x3f,
     ]);
 }
 
@@ -155,6 +166,9 @@ fn bytes_of_an_updates_refusals() {
         (R::LogFull, &[16]),
         (failed, &[17, 2, 0x80, 0x01]),
         (R::Busy { wait_ms: 7 }, &[18, 7]),
+        (R::NotSigned, &[19]),
+        (R::BadSignature, &[20]),
+        (R::BadNoise, &[21]),
     ] {
         assert_bytes(&Reply::Refused(refusal), &[&[0], bytes].concat());
         // In words, of which the last say what to do.
@@ -337,6 +351,11 @@ fn the_longest_messages_fit_a_frame() {
     let mut writer = FrameWriter::new();
     let measure = Request::Measure(vec(&[asked; MAX_MATCHES]));
     assert!(writer.seal(u16::MAX, &measure).is_some());
+    let noisy = Request::MeasureNoisy(NoisyMatches {
+        noise_px: f32::MAX,
+        matches: vec(&[asked; MAX_MATCHES]),
+    });
+    assert!(writer.seal(u16::MAX, &noisy).is_some());
     let chunk = Request::Chunk(Chunk {
         offset: u32::MAX,
         bytes: vec(&[0xff; MAX_CHUNK]),
