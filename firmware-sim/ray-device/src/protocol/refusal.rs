@@ -177,7 +177,7 @@ impl core::fmt::Display for Refusal {
                 let reason = match open_error {
                     2 => "what was sent is no blob",
                     3 => {
-                        "the blob is of a format version that the device does not read: bring its firmware up to date, or pack for that version"
+                        "the blob is of a format version that the device does not read: bring its firmware up to date"
                     }
                     5 => "the blob was damaged before it was sent: pack it again",
                     15 => {
