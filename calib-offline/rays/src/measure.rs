@@ -1,6 +1,7 @@
 //! Who turns a match into a point, and the calibration that does it in f64; `matches` has the blob
 //! that does it with the device's own f32 code.
 
+pub use crate::field::Gap;
 use crate::field::{MeasureError, Rig};
 use crate::geometry::{PixelPoint, RigidTransform, TriangulateError};
 use nalgebra::RealField;
@@ -58,18 +59,6 @@ pub struct Point<N> {
     /// Predicted standard deviation along each axis, mm: what the calibration leaves uncertain, and the
     /// noise of the pixels. `None` where the rig does not say.
     pub sigma_mm: Option<[N; 3]>,
-}
-
-/// A gap beside what is predicted of it: pixels whose coordinates are off by `s` px give it the variance
-/// `calibration_mm2 + s * s * mm2_per_px2`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gap {
-    /// Length of the common perpendicular, mm.
-    pub gap_mm: f64,
-    /// What the calibration leaves uncertain of it, mm^2.
-    pub calibration_mm2: f64,
-    /// What noise of one pixel makes of it, mm^2/px^2.
-    pub mm2_per_px2: f64,
 }
 
 /// Turns matches into points.

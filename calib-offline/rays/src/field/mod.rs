@@ -19,5 +19,5 @@ pub use base_lens::{BaseLens, Projection};
 pub use coverage::CoverageMask;
 pub use ray_field::{FieldSample, RayField, SmoothMap};
 pub use ray_table::RayTable;
-pub use rig::{CalibratedCamera, MeasureError, PointCovariance, Rig};
+pub use rig::{CalibratedCamera, Gap, MeasureError, PointCovariance, Rig};
 pub use uncertainty::PairUncertainty;

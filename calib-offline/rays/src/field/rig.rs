@@ -6,7 +6,6 @@ use crate::geometry::{
     PixelPoint, Ray, RigidTransform, Triangulation, midpoint_by_shifts, triangulate_pair,
     triangulate_rays,
 };
-use crate::measure::Gap;
 use nalgebra::{Matrix3, Matrix3x2, Matrix3x4, Matrix4, Vector3, Vector4};
 use serde::{Deserialize, Serialize};
 
@@ -111,6 +110,18 @@ impl PointCovariance {
     pub fn total_mm2(&self) -> Matrix3<f64> {
         self.calibration_mm2 + self.noise_mm2
     }
+}
+
+/// A gap beside what is predicted of it: pixels whose coordinates are off by `s` px give it the variance
+/// `calibration_mm2 + s * s * mm2_per_px2`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gap {
+    /// Length of the common perpendicular, mm.
+    pub gap_mm: f64,
+    /// What the calibration leaves uncertain of it, mm^2.
+    pub calibration_mm2: f64,
+    /// What noise of one pixel makes of it, mm^2/px^2.
+    pub mm2_per_px2: f64,
 }
 
 /// Two sightings of a pair with uncertainty, the pair's first camera first.
