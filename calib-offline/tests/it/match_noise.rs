@@ -1,6 +1,7 @@
 //! Matches that are noisier than the corners of the calibration: said, written into the blob, or estimated from the
 //! gaps, on the host and on a device.
 
+use crate::common::documented::assert_documented;
 use crate::common::standard::standard;
 use crate::common::{project, run, with_uncertainty};
 use calib_blob::matches::{BlobSource, estimate_noise};
@@ -227,6 +228,7 @@ fn gaps_are_asked_on_request_and_refuse_what_they_do_not_say() {
     }
     let arguments = [&["measure", "c.json", "m.csv", "--json"], &estimate[..]].concat();
     let object = run(path, &arguments).assert_code(0).json();
+    assert_documented("measure", "calib-offline/measure/1", &[object.clone()], &[]);
     let noise = &object["estimated_match_noise"];
     assert_eq!(noise["px"], object["match_noise_px"]);
     assert_eq!(noise["gaps"], 300);
