@@ -11,8 +11,9 @@ use super::usage_error::UsageError;
 use crate::device::{DeviceSource, connect};
 use crate::present::numbers::short;
 use calib_blob::matches::{
-    BlobSource, MatchesError, MeasureSummary, NoiseEstimate, POINTS_HEADER, StreamError,
-    estimate_noise, measure_batches, measure_stream,
+    BlobSource, MatchesError, MeasureSummary, NoiseError, NoiseEstimate, POINTS_HEADER,
+    StreamError, measure_batches, measure_with_blob, measure_with_calibration, noise_with_blob,
+    noise_with_calibration,
 };
 use calib_rays::measure::{PointSource, RigSource};
 use calib_recording::atomic_file::{PendingFile, WriteError};
@@ -20,7 +21,7 @@ use clap::Args;
 use firmware_sim::client::DEFAULT_TIMEOUT;
 use serde::Serialize;
 use std::fs::File;
-use std::io::{Read, Write};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 const EXAMPLE: &str = "\
@@ -174,13 +175,16 @@ fn measure_here(args: &MeasureArgs, rig: &Path) -> Result<(&'static str, Measure
                 &BlobSource::new(&blob, None),
                 BlobSource::new(&blob, frame),
             )?;
-            let (mut input, noise) = prepare(args, &source)?;
+            let (mut input, noise) =
+                prepare(args, |input| noise_with_blob(&source, &args.matches, input))?;
             let own_px = blob.match_noise().map(|noise| f64::from(noise.px()));
             let source = match noise.match_noise_px.and_then(in_f32) {
                 Some(noise) => source.with_noise(noise),
                 None => source,
             };
-            let summary = measure(args, &mut input, &source)?;
+            let summary = stream(args, &mut input, |file, input, output| {
+                measure_with_blob(&source, file, input, output)
+            })?;
             ("blob", (summary, noise.or_of_rig(own_px)))
         }
         RigFile::Calibration(mut calibration) => {
@@ -192,7 +196,9 @@ fn measure_here(args: &MeasureArgs, rig: &Path) -> Result<(&'static str, Measure
                     &RigSource::new(own, None),
                     RigSource::new(own, frame),
                 )?;
-                prepare(args, &source)?
+                prepare(args, |input| {
+                    noise_with_calibration(&source, &args.matches, input)
+                })?
             };
             let own = &mut calibration.rig;
             let noise = noise.or_of_rig(own.match_noise_px);
@@ -203,7 +209,10 @@ fn measure_here(args: &MeasureArgs, rig: &Path) -> Result<(&'static str, Measure
                 &RigSource::new(own, None),
                 RigSource::new(own, frame),
             )?;
-            ("calibration", (measure(args, &mut input, &source)?, noise))
+            let summary = stream(args, &mut input, |file, input, output| {
+                measure_with_calibration(&source, file, input, output)
+            })?;
+            ("calibration", (summary, noise))
         }
     })
 }
@@ -243,7 +252,7 @@ impl NoiseUsed {
 /// The matches, and how noisy they are if it was said or is to be estimated: then they are held in memory.
 fn prepare(
     args: &MeasureArgs,
-    source: &impl PointSource,
+    estimate: impl FnOnce(&mut dyn Read) -> Result<Result<NoiseEstimate, NoiseError>, MatchesError>,
 ) -> Result<(Box<dyn Read>, NoiseUsed), Error> {
     let mut input = open_matches(args)?;
     if !args.estimate_match_noise {
@@ -260,22 +269,12 @@ fn prepare(
             file: args.matches.clone(),
             source,
         })?;
-    let estimate = estimate_noise(source, &args.matches, &mut bytes.as_slice())??;
+    let estimate = estimate(&mut bytes.as_slice())??;
     let noise = NoiseUsed {
         match_noise_px: Some(estimate.px),
         estimated_match_noise: Some(estimate),
     };
     Ok((Box::new(std::io::Cursor::new(bytes)), noise))
-}
-
-fn measure(
-    args: &MeasureArgs,
-    input: &mut Box<dyn Read>,
-    source: &impl PointSource,
-) -> Result<MeasureSummary, Error> {
-    stream(args, input, |file, input, output| {
-        measure_stream(source, file, input, output)
-    })
 }
 
 fn open_matches(args: &MeasureArgs) -> Result<Box<dyn Read>, MatchesError> {

@@ -4,7 +4,7 @@
 use crate::common::documented::assert_documented;
 use crate::common::standard::standard;
 use crate::common::{project, run, with_uncertainty};
-use calib_blob::matches::{BlobSource, estimate_noise};
+use calib_blob::matches::{BlobSource, noise_with_blob, noise_with_calibration};
 use calib_blob::pack::{AlignedBytes, PackSettings, pack};
 use calib_rays::geometry::best_placement;
 use calib_rays::measure::{PointSource, RigSource};
@@ -77,7 +77,7 @@ fn sigmas_of_noisy_matches_cover_and_the_gaps_say_how_noisy_they_are() {
     let csv = as_csv(&matches);
     let file = Path::new("m.csv");
     let source = RigSource::new(&rig, None).unwrap();
-    let noise = estimate_noise(&source, file, &mut csv.as_bytes());
+    let noise = noise_with_calibration(&source, file, &mut csv.as_bytes());
     let noise = noise.unwrap().unwrap();
     assert!(
         (noise.low_px..=noise.high_px).contains(&NOISE_PX),
@@ -92,7 +92,7 @@ fn sigmas_of_noisy_matches_cover_and_the_gaps_say_how_noisy_they_are() {
     let blob = RayBlob::open(&bytes).unwrap();
     let px = blob.match_noise().map(MatchNoise::px);
     assert_eq!(px, Some(NOISE_PX as f32));
-    let of_blob = estimate_noise(
+    let of_blob = noise_with_blob(
         &BlobSource::new(&blob, None).unwrap(),
         file,
         &mut csv.as_bytes(),

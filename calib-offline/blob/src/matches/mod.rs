@@ -18,7 +18,7 @@ pub use error::MatchesError;
 pub use header::Columns;
 pub use known::{KnownMatches, TruePoint, read_known};
 pub use list::read_matches;
-pub use noise::{NoiseError, NoiseEstimate, estimate_noise};
+pub use noise::{NoiseError, NoiseEstimate, noise_with_blob, noise_with_calibration};
 pub use row::POINTS_HEADER;
 pub use stream::{
     MeasureSummary, StreamError, measure_batches, measure_with_blob, measure_with_calibration,

@@ -8,9 +8,10 @@
 //! Gaps see only the noise across the plane of the two rays. That within it, which makes most of the error in
 //! depth, opens none; it is taken to be as large.
 
+use super::blob_source::BlobSource;
 use super::error::MatchesError;
 use super::stream::each_match;
-use calib_rays::measure::{Gap, PointSource};
+use calib_rays::measure::{Gap, PointSource, RigSource};
 use calib_rays::remedy::Remedy;
 use serde::Serialize;
 use std::io::Read;
@@ -83,14 +84,34 @@ impl Remedy for NoiseError {
 ///
 /// # Errors
 /// [`MatchesError`]; inside the result, why the gaps do not say.
-pub fn estimate_noise<S: PointSource>(
+pub fn noise_with_blob(
+    source: &BlobSource<'_>,
+    file: &Path,
+    input: &mut dyn Read,
+) -> Result<Result<NoiseEstimate, NoiseError>, MatchesError> {
+    estimate_noise(source, file, input)
+}
+
+/// The same with a calibration.
+///
+/// # Errors
+/// Those of [`noise_with_blob`].
+pub fn noise_with_calibration(
+    source: &RigSource<'_>,
+    file: &Path,
+    input: &mut dyn Read,
+) -> Result<Result<NoiseEstimate, NoiseError>, MatchesError> {
+    estimate_noise(source, file, input)
+}
+
+fn estimate_noise<S: PointSource>(
     source: &S,
     file: &Path,
-    input: &mut impl Read,
+    mut input: &mut dyn Read,
 ) -> Result<Result<NoiseEstimate, NoiseError>, MatchesError> {
     let mut gaps = Vec::new();
     let mut points = 0;
-    each_match(&source.cameras(), file, input, |sightings| {
+    each_match(&source.cameras(), file, &mut input, |sightings| {
         if sightings.len() == 2 {
             points += usize::from(source.point(sightings).is_ok());
             gaps.extend(source.gap(sightings));
