@@ -134,8 +134,8 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-fn measured(path: &Path, arguments: &[&str]) -> String {
-    let arguments = [&["measure"], arguments, &["m.csv", "-o", "p.csv"]].concat();
+fn measured(path: &Path, rig: &[&str], noise: &[&str]) -> String {
+    let arguments = [&["measure"], rig, &["m.csv", "-o", "p.csv"], noise].concat();
     run(path, &arguments).assert_code(0);
     fs::read_to_string(path.join("p.csv")).unwrap()
 }
@@ -147,13 +147,14 @@ fn a_device_and_the_host_take_the_noise_from_the_blob_or_the_request() {
     let any_port = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
     let device = SimulatedDevice::start(any_port, &[]).unwrap();
     let address = format!("tcp:{}", device.address());
-    let [given, more] = [&["--match-noise-px", "0.2"], &["--match-noise-px", "0.3"]];
+    let given = &["--match-noise-px", "0.2"][..];
+    let more = &["--match-noise-px", "0.3"][..];
     let mut answers = Vec::new();
     for blob in ["plain.rays", "noisy.rays"] {
         run(path, &["flash", blob, "--device", &address]).assert_code(0);
         for noise in [&[][..], given, more] {
-            let here = measured(path, &[&[blob], noise].concat());
-            let there = measured(path, &[&["--device", &address], noise].concat());
+            let here = measured(path, &[blob], noise);
+            let there = measured(path, &["--device", &address], noise);
             assert_eq!(here, there, "{blob} {noise:?}");
             answers.push(here);
         }
@@ -199,9 +200,10 @@ fn a_calibration_a_blob_and_inspect_say_the_noise() {
     fs::write(path.join("noisy.json"), noisy.to_json().unwrap()).unwrap();
     let object = json(&["measure", "noisy.json", "m.csv", "-o", "p.csv", "--json"]);
     assert_eq!(object["match_noise_px"], 0.2);
+    let given = &["--match-noise-px", "0.2"];
     let [stated, asked] = [
-        measured(path, &["noisy.json"]),
-        measured(path, &["c.json", "--match-noise-px", "0.2"]),
+        measured(path, &["noisy.json"], &[]),
+        measured(path, &["c.json"], given),
     ];
     assert_eq!(stated, asked);
     let pack = ["pack", "noisy.json", "-o", "again.rays", "--json"];
@@ -234,7 +236,7 @@ fn gaps_are_asked_on_request_and_refuse_what_they_do_not_say() {
     assert_eq!(noise["gaps"], 300);
     let estimated = fs::read(path.join("p.csv")).unwrap();
     let px = object["match_noise_px"].as_f64().unwrap().to_string();
-    let said = measured(path, &["c.json", "--match-noise-px", &px]);
+    let said = measured(path, &["c.json"], &["--match-noise-px", &px]);
     assert!(estimated == said.as_bytes());
 
     fs::remove_file(path.join("p.csv")).unwrap();
