@@ -172,7 +172,7 @@ fn measure_here(args: &MeasureArgs, rig: &Path) -> Result<(&'static str, Measure
             let source = checked(
                 args,
                 rig,
-                &BlobSource::new(&blob, None),
+                names(BlobSource::new(&blob, None)),
                 BlobSource::new(&blob, frame),
             )?;
             let (mut input, noise) =
@@ -193,7 +193,7 @@ fn measure_here(args: &MeasureArgs, rig: &Path) -> Result<(&'static str, Measure
                 let source = checked(
                     args,
                     rig,
-                    &RigSource::new(own, None),
+                    names(RigSource::new(own, None)),
                     RigSource::new(own, frame),
                 )?;
                 prepare(args, |input| {
@@ -206,7 +206,7 @@ fn measure_here(args: &MeasureArgs, rig: &Path) -> Result<(&'static str, Measure
             let source = checked(
                 args,
                 rig,
-                &RigSource::new(own, None),
+                names(RigSource::new(own, None)),
                 RigSource::new(own, frame),
             )?;
             let summary = stream(args, &mut input, |file, input, output| {
@@ -217,23 +217,23 @@ fn measure_here(args: &MeasureArgs, rig: &Path) -> Result<(&'static str, Measure
     })
 }
 
-/// The source of the frame asked for, if the rig has that and two cameras; `in_rig` is that of its own frame.
-fn checked<S: PointSource>(
+fn names(source: Option<impl PointSource>) -> Vec<String> {
+    source.map(|source| source.cameras()).unwrap_or_default()
+}
+
+/// The source of the frame asked for, if it is that of one of these cameras, and they are two.
+fn checked<S>(
     args: &MeasureArgs,
     rig: &Path,
-    in_rig: &Option<S>,
-    in_frame: Option<S>,
+    known: Vec<String>,
+    source: Option<S>,
 ) -> Result<S, UsageError> {
-    let known = in_rig
-        .as_ref()
-        .map(PointSource::cameras)
-        .unwrap_or_default();
     if known.len() < 2 {
         return Err(UsageError::OneCamera {
             path: rig.to_owned(),
         });
     }
-    in_frame.ok_or_else(|| UsageError::UnknownFrame {
+    source.ok_or_else(|| UsageError::UnknownFrame {
         name: args.frame.clone().unwrap_or_default(),
         known,
     })
@@ -333,16 +333,19 @@ fn in_words(object: &MeasureObject<'_>) -> String {
     if let Some(gap_mm) = summary.gap_rms_mm {
         parts.push(format!("gap {} mm RMS", short(gap_mm)));
     }
-    let mut words = parts.join(", ");
     if let Some(found) = &object.noise.estimated_match_noise {
-        words += &format!(
-            "; the matches are off by {} px per coordinate ({} to {} px with 95 % confidence), by the median of {} gaps: \
-             across the plane of the two rays, and within it taken to be as much",
+        parts.push(format!(
+            "matches off by {} px per coordinate ({} to {} px with 95 % confidence; by the median of {} gaps: across the \
+             plane of the two rays, and within it taken to be as much)",
             short(found.px),
             short(found.low_px),
             short(found.high_px),
             found.gaps
-        );
+        ));
     }
-    format!("{words}; written to {}", object.output.display())
+    format!(
+        "{}; written to {}",
+        parts.join(", "),
+        object.output.display()
+    )
 }

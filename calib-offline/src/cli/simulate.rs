@@ -16,6 +16,7 @@ use std::path::PathBuf;
 /// holdout.csv) and the truth about all of it (`*_truth.csv`, truth.json). The same command writes
 /// the same bytes.
 #[derive(Debug, Clone, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag")]
 pub struct SimulateArgs {
     /// Folder to write; it appears whole or not at all
     #[arg(short, long, value_name = "DIR")]

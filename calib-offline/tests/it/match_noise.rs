@@ -230,7 +230,12 @@ fn gaps_are_asked_on_request_and_refuse_what_they_do_not_say() {
     }
     let arguments = [&["measure", "c.json", "m.csv", "--json"], &estimate[..]].concat();
     let object = run(path, &arguments).assert_code(0).json();
-    assert_documented("measure", "calib-offline/measure/1", &[object.clone()], &[]);
+    assert_documented(
+        "measure",
+        "calib-offline/measure/1",
+        std::slice::from_ref(&object),
+        &[],
+    );
     let noise = &object["estimated_match_noise"];
     assert_eq!(noise["px"], object["match_noise_px"]);
     assert_eq!(noise["gaps"], 300);
@@ -278,7 +283,7 @@ fn the_readmes_third_command_prints_sigmas_that_cover() {
     let stage = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/stage");
     let dataset = stage.to_str().unwrap();
     run(folder.path(), &["calibrate", dataset, "-o", "out"]).assert_code(0);
-    let (mut within, mut count) = (0, 0);
+    let (mut within, mut count) = (0_usize, 0_usize);
     for name in ["holdout", "matches"] {
         let matches = stage.join(format!("{name}.csv"));
         let measure = ["measure", "out/rig.rays", matches.to_str().unwrap()];

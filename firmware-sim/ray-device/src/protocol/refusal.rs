@@ -173,20 +173,7 @@ impl core::fmt::Display for Refusal {
                 out,
                 "the stored bytes have the checksum {stored:08x}, not the announced {announced:08x}: send the blob again"
             ),
-            Self::NotABlob { open_error } => {
-                let reason = match open_error {
-                    2 => "what was sent is no blob",
-                    3 => {
-                        "the blob is of a format version that the device does not read: bring its firmware up to date"
-                    }
-                    5 => "the blob was damaged before it was sent: pack it again",
-                    15 => {
-                        "the blob says what a device must know to measure with it, and this one does not: bring its firmware up to date"
-                    }
-                    _ => "what was sent cannot be opened as a blob: pack it again",
-                };
-                write!(out, "{reason} (code {open_error})")
-            }
+            Self::NotABlob { open_error } => write_not_a_blob(out, open_error),
             Self::OtherIdentity => write!(
                 out,
                 "the blob is of another calibration than announced: send the file again"
@@ -237,6 +224,22 @@ impl core::fmt::Display for Refusal {
             ),
         }
     }
+}
+
+/// The codes are the runtime's; these are the ones that a user can act upon.
+fn write_not_a_blob(out: &mut core::fmt::Formatter<'_>, open_error: u8) -> core::fmt::Result {
+    let reason = match open_error {
+        2 => "what was sent is no blob",
+        3 => {
+            "the blob is of a format version that the device does not read: bring its firmware up to date"
+        }
+        5 => "the blob was damaged before it was sent: pack it again",
+        15 => {
+            "the blob says what a device must know to measure with it, and this one does not: bring its firmware up to date"
+        }
+        _ => "what was sent cannot be opened as a blob: pack it again",
+    };
+    write!(out, "{reason} (code {open_error})")
 }
 
 fn write_other_rig(
