@@ -8,7 +8,9 @@
 use libfuzzer_sys::fuzz_target;
 use nalgebra::Vector3;
 use ray_runtime::format::{CRC_OFFSET, Form, checksum};
-use ray_runtime::{Camera, PixelPoint, RayBlob, Readout, SensorWindow};
+use ray_runtime::{
+    Camera, MatchNoise, PixelPoint, PointCovariance, RayBlob, Readout, SensorWindow,
+};
 
 /// Longest input that is looked at, bytes.
 const MAX_LEN: usize = 1 << 16;
@@ -106,6 +108,16 @@ fn ask_everything(blob: &RayBlob<'_>) {
                 bits(measured.found.point_mm.into())
             );
             let _ = measured.covariance.map(|covariance| covariance.sigma_mm());
+            // What a request says of the noise in place of the blob: the same bits if it says the same.
+            if let Some(noise) = blob.match_noise() {
+                let asked = blob.triangulate_with_noise(a, b, noise);
+                let sigma = |found: Option<PointCovariance>| found.map(|c| bits(c.sigma_mm()));
+                assert_eq!(
+                    sigma(asked.ok().and_then(|m| m.covariance)),
+                    sigma(measured.covariance)
+                );
+            }
+            let _ = blob.triangulate_with_noise(a, b, MatchNoise::NONE);
             // Twice at most: a projection costs as much as a hundred points.
             if k % 32 == 0 {
                 ask_back(blob, a, b.0, &point.point_mm);

@@ -1,7 +1,7 @@
 //! Exact bytes: the golden blobs of versions 1, 2 and 4 are read as on the day they were written.
 
 use ray_runtime::format::{self, Encoding, HEADER_LEN, Header, MAGIC, RECORD_LEN, Record};
-use ray_runtime::{Aligned, LookupError, MeasureError, PixelPoint, RayBlob, Region};
+use ray_runtime::{Aligned, LookupError, MatchNoise, MeasureError, PixelPoint, RayBlob, Region};
 
 static GOLDEN: &Aligned<[u8]> = &Aligned(*include_bytes!("../../../data/golden/stereo-v1.rays"));
 
@@ -180,7 +180,7 @@ fn version_4_has_the_noise_of_matches_behind_the_pair() {
     assert_eq!(bytes[section + 12..], [0; 4]);
     let blob = RayBlob::open(bytes).unwrap();
     assert_eq!(blob.run_self_tests(), Ok(10));
-    assert_eq!(blob.match_noise().map(|noise| noise.px()), Some(0.375));
+    assert_eq!(blob.match_noise().map(MatchNoise::px), Some(0.375));
     let (a, b) = (PixelPoint::new(30.0, 20.5), PixelPoint::new(33.0, 21.0));
     let measured = blob.triangulate_with_covariance((0, a), (1, b)).unwrap();
     let sigma_mm = measured.covariance.unwrap().sigma_mm();
