@@ -131,7 +131,7 @@ fn of_devices() {
     fs::write(path.join("matches.csv"), matches).unwrap();
     let measure = ["measure", "matches.csv", "-o", "points.csv"];
     let measured = json(path, &[&measure[..], &there].concat());
-    assert_documented("measure", "calib-offline/measure/1", &[measured], &[]);
+    assert_listed("measure", "calib-offline/measure/1", &[measured]);
 
     let device = |verb: &str| json(path, &[&["device", verb], &there[..]].concat());
     let owned = "a device that was built with its cameras";
