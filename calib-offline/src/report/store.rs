@@ -299,4 +299,16 @@ mod tests {
         let error = changed(|v| v["corners"][0]["camera_idx"] = 2.into()).unwrap_err();
         assert!(error.to_string().contains("belongs to no camera"));
     }
+
+    #[test]
+    fn the_noise_of_matches_is_in_range_or_absent() {
+        let with = |px: f64| changed(|v| v["rig"]["match_noise_px"] = px.into());
+        let noise_px = |px: f64| with(px).unwrap().rig.match_noise_px;
+        assert_eq!([0.0, 0.2].map(noise_px), [Some(0.0), Some(0.2)]);
+        assert_eq!(example::calibration().rig.match_noise_px, None);
+        for px in [-0.1, 1e-9, 2000.0] {
+            let error = with(px).unwrap_err().to_string();
+            assert!(error.contains("noise of matches"), "{error}");
+        }
+    }
 }
