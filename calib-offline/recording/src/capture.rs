@@ -230,10 +230,14 @@ mod tests {
                 name: "left".to_owned(),
                 sensor,
                 images: Vec::new(),
+                optics: None,
+                serial: None,
             }],
             stage: None,
             excluded_poses: [].into(),
             target: None,
+            certificate: None,
+            recording: None,
         }
     }
 

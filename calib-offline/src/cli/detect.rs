@@ -265,10 +265,14 @@ mod tests {
                 name: "left".to_string(),
                 sensor: SensorSize::new(64, 48),
                 images: vec![None, Some(path)],
+                optics: None,
+                serial: None,
             }],
             stage: None,
             excluded_poses: std::collections::BTreeSet::new(),
             target: None,
+            certificate: None,
+            recording: None,
         };
         let overlays = folder.path().join("overlays");
         let args = DetectArgs {

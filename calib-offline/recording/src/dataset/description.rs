@@ -3,6 +3,7 @@
 use super::target::TargetSpec;
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::SensorSize;
+use serde::Deserialize;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
@@ -21,6 +22,10 @@ pub struct Dataset {
     pub excluded_poses: BTreeSet<usize>,
     /// The measurement target, if the manifest describes one. No calibration depends on it.
     pub target: Option<TargetSpec>,
+    /// What the board's maker or a measurement says of it.
+    pub certificate: Option<Certificate>,
+    /// Who recorded it, and when.
+    pub recording: Option<RecordingSpec>,
 }
 
 impl Dataset {
@@ -71,6 +76,56 @@ pub struct CameraSpec {
     /// One entry per pose, in order; `None` where this camera has no image of the pose. Empty if
     /// the dataset has corners only.
     pub images: Vec<Option<PathBuf>>,
+    /// What the user expects of its rays; `None` is no expectation.
+    pub optics: Option<ExpectedOptics>,
+    /// Serial number.
+    pub serial: Option<String>,
+}
+
+/// What stands before a camera, as far as the user declares it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ExpectedOptics {
+    /// A lens in air: all rays meet in a point.
+    Plain,
+    /// A window in air.
+    Window,
+    /// A flat port into another medium.
+    Port,
+    /// Some housing.
+    Housing,
+    /// A mirror: the board is seen as its mirror image.
+    Mirror,
+    /// A fisheye lens.
+    Fisheye,
+    /// Parallel rays.
+    Telecentric,
+}
+
+/// Standard deviations and temperatures of the board; a key that is not given is not known.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Certificate {
+    /// Of the scale, parts per million.
+    pub scale_ppm_sd: Option<f64>,
+    /// Of the face from a plane, mm.
+    pub flatness_mm_sd: Option<f64>,
+    /// Thermal expansion, parts per million and kelvin.
+    pub expansion_ppm_per_k: Option<f64>,
+    /// Temperature at which its lengths hold, degrees Celsius.
+    pub calibrated_at_c: Option<f64>,
+    /// Temperature while it was recorded, degrees Celsius.
+    pub used_at_c: Option<f64>,
+}
+
+/// What the recording is called, who made it, and when; text as it stands in the manifest.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct RecordingSpec {
+    /// Name.
+    pub name: Option<String>,
+    /// Person.
+    pub by: Option<String>,
+    /// Day, as year-month-day.
+    pub date: Option<String>,
 }
 
 /// What is known about the rotation stage. Every part is optional and used for checks only.

@@ -78,10 +78,14 @@ mod tests {
                 name: "left".to_owned(),
                 sensor: SensorSize::new(640, 480),
                 images: Vec::new(),
+                optics: None,
+                serial: None,
             }],
             stage: None,
             excluded_poses: [3].into(),
             target: None,
+            certificate: None,
+            recording: None,
         };
         let views = vec![View {
             camera_idx: 0,

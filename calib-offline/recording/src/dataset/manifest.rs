@@ -1,6 +1,7 @@
 //! `dataset.toml`: reading it strictly. A key that means nothing is an error, and so is a value
 //! that cannot be meant; each names the line.
 
+mod declared;
 mod error;
 mod images;
 mod limits;
@@ -16,7 +17,7 @@ pub use limits::{
 };
 pub use target_problem::TargetProblem;
 
-use super::description::{CameraSpec, Dataset, StageSpec};
+use super::description::{CameraSpec, Certificate, Dataset, StageSpec};
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::SensorSize;
 use raw::{RawBoard, RawCamera, RawManifest, RawStage};
@@ -45,7 +46,7 @@ impl Dataset {
             Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
             _ => PathBuf::from("."),
         };
-        let board = board(&source, raw.board)?;
+        let (board, certificate) = board(&source, raw.board)?;
         let has_corners = folder.join(Self::CORNERS).exists();
         let cameras = cameras(&source, &folder, &raw.camera, has_corners)?;
         let mut dataset = Self {
@@ -55,6 +56,11 @@ impl Dataset {
             stage: None,
             excluded_poses: BTreeSet::new(),
             target: None,
+            certificate,
+            recording: raw
+                .recording
+                .map(|raw| declared::recording(&source, raw))
+                .transpose()?,
         };
         dataset.target = target::target(&source, &dataset, raw.target, &raw.camera)?;
         let pose_count = (!has_corners).then(|| dataset.image_pose_count());
@@ -78,7 +84,10 @@ impl Dataset {
     }
 }
 
-fn board(source: &Source, raw: Option<Spanned<RawBoard>>) -> Result<BoardSpec, ManifestError> {
+fn board(
+    source: &Source,
+    raw: Option<Spanned<RawBoard>>,
+) -> Result<(BoardSpec, Option<Certificate>), ManifestError> {
     let file = source.file.clone();
     let raw = raw.ok_or_else(|| ManifestError::Missing {
         file: file.clone(),
@@ -125,11 +134,14 @@ fn board(source: &Source, raw: Option<Spanned<RawBoard>>) -> Result<BoardSpec, M
     } else if value > MAX_SQUARE_MM {
         "more than ten meters (the unit is mm)"
     } else {
-        return Ok(BoardSpec {
+        let board = BoardSpec {
             rows: rows as usize,
             cols: cols as usize,
             square_mm: value,
-        });
+        };
+        let certificate = raw.certificate;
+        let certificate = certificate.map(|raw| declared::certificate(source, raw));
+        return Ok((board, certificate.transpose()?));
     };
     Err(ManifestError::SquareSize {
         file,
@@ -196,6 +208,8 @@ fn cameras(
                 name,
                 sensor: SensorSize::new(width as u32, height as u32),
                 images,
+                optics: camera.optics,
+                serial: camera.serial.clone(),
             },
         ));
     }

@@ -52,6 +52,8 @@ mod tests {
                 name: "left".to_owned(),
                 sensor: SensorSize::new(640, 480),
                 images: Vec::new(),
+                optics: None,
+                serial: None,
             }],
             stage: None,
             excluded_poses: std::collections::BTreeSet::new(),
@@ -64,6 +66,8 @@ mod tests {
                 direction: vec![(2, 3)],
                 images: Vec::new(),
             }),
+            certificate: None,
+            recording: None,
         };
         assert_eq!(load_markers(&dataset).unwrap(), None);
         let write = |rows: &str| {

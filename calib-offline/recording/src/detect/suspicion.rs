@@ -225,6 +225,8 @@ mod tests {
             name: name.to_owned(),
             sensor: SensorSize::new(640, 480),
             images: Vec::new(),
+            optics: None,
+            serial: None,
         };
         Dataset {
             folder: ".".into(),
@@ -233,6 +235,8 @@ mod tests {
             stage: None,
             excluded_poses: [].into(),
             target: None,
+            certificate: None,
+            recording: None,
         }
     }
 

@@ -19,11 +19,15 @@ fn dataset() -> Dataset {
                 name: name.to_owned(),
                 sensor: SensorSize::new(1280, 1024),
                 images: Vec::new(),
+                optics: None,
+                serial: None,
             })
             .into(),
         stage: None,
         excluded_poses: BTreeSet::new(),
         target: None,
+        certificate: None,
+        recording: None,
     }
 }
 

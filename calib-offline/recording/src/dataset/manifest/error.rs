@@ -288,6 +288,32 @@ pub enum ManifestError {
         /// The camera.
         camera: String,
     },
+    /// A number of the board's certificate that cannot be meant.
+    #[error("{}:{line}: [board.certificate] {key} = {value} is not between {least:e} and {most:e}", file.display())]
+    Certificate {
+        /// The manifest.
+        file: PathBuf,
+        /// From 1.
+        line: usize,
+        /// The key.
+        key: &'static str,
+        /// The value.
+        value: f64,
+        /// Least that can be meant.
+        least: f64,
+        /// Most that can be meant.
+        most: f64,
+    },
+    /// A date that is none.
+    #[error("{}:{line}: [recording] date = \"{text}\" is not a date", file.display())]
+    Date {
+        /// The manifest.
+        file: PathBuf,
+        /// From 1.
+        line: usize,
+        /// What stands there.
+        text: String,
+    },
     /// The measurement target.
     #[error("{}:{line}: {problem}", file.display())]
     Target {
@@ -309,7 +335,7 @@ impl Remedy for ManifestError {
             Self::Read { .. } | Self::ImageFolder { .. } => "check the path and the permissions",
             Self::NotText { .. } => "save the manifest as UTF-8 text",
             Self::Syntax { .. } => {
-                "correct the line; the keys are [dataset] exclude; [board] kind, rows, cols, square_mm; [[camera]] name, width, height, images or image_list, target_images; [stage] angles_deg, placement; [target] kind, rows, cols, pitch_mm, outer_radius_mm, direction_outer_radius_mm, direction"
+                "correct the line; the keys are [dataset] exclude; [board] kind, rows, cols, square_mm; [board.certificate] scale_ppm_sd, flatness_mm_sd, expansion_ppm_per_k, calibrated_at_c, used_at_c; [[camera]] name, width, height, images or image_list, target_images, optics, serial; [recording] name, by, date; [stage] angles_deg, placement; [target] kind, rows, cols, pitch_mm, outer_radius_mm, direction_outer_radius_mm, direction"
             }
             Self::Missing { .. } => {
                 "add it; rows and cols count inner corners, width and height are pixels"
@@ -347,6 +373,10 @@ impl Remedy for ManifestError {
             Self::NothingToRead { .. } => {
                 "add images = \"folder/*.png\" to the camera, or put corners.csv (camera,pose,row,col,u,v) into the folder"
             }
+            Self::Certificate { .. } => {
+                "give standard deviations in ppm and mm, temperatures in degrees Celsius, or leave the key out"
+            }
+            Self::Date { .. } => "write year-month-day, such as date = \"2026-11-30\"",
             Self::Target { problem, .. } => problem.remedy(),
         };
         Some(text.to_owned())

@@ -1,5 +1,6 @@
 //! The tables of `dataset.toml` as they are read, before anything is checked.
 
+use crate::dataset::description::ExpectedOptics;
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -12,6 +13,7 @@ pub(super) struct RawManifest {
     pub camera: Vec<Spanned<RawCamera>>,
     pub stage: Option<RawStage>,
     pub target: Option<Spanned<RawTarget>>,
+    pub recording: Option<RawRecording>,
 }
 
 #[derive(Deserialize)]
@@ -28,6 +30,25 @@ pub(super) struct RawBoard {
     pub rows: Option<Spanned<i64>>,
     pub cols: Option<Spanned<i64>>,
     pub square_mm: Option<Spanned<f64>>,
+    pub certificate: Option<RawCertificate>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawCertificate {
+    pub scale_ppm_sd: Option<Spanned<f64>>,
+    pub flatness_mm_sd: Option<Spanned<f64>>,
+    pub expansion_ppm_per_k: Option<Spanned<f64>>,
+    pub calibrated_at_c: Option<Spanned<f64>>,
+    pub used_at_c: Option<Spanned<f64>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawRecording {
+    pub name: Option<String>,
+    pub by: Option<String>,
+    pub date: Option<Spanned<String>>,
 }
 
 #[derive(Deserialize)]
@@ -39,6 +60,8 @@ pub(super) struct RawCamera {
     pub images: Option<Spanned<String>>,
     pub image_list: Option<Spanned<Vec<String>>>,
     pub target_images: Option<Spanned<String>>,
+    pub optics: Option<ExpectedOptics>,
+    pub serial: Option<String>,
 }
 
 #[derive(Deserialize)]

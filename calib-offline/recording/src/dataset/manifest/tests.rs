@@ -1,4 +1,5 @@
 use super::*;
+use crate::dataset::ExpectedOptics;
 use calib_rays::remedy::Remedy as _;
 use std::fs;
 
@@ -295,4 +296,24 @@ fn the_mark_before_the_text_and_other_line_ends_do_not_matter() {
     let text = format!("\u{feff}{}", good().replace('\n', "\r\n"));
     let folder = folder(&text);
     assert_eq!(Dataset::load(folder.path()).unwrap().cameras.len(), 2);
+}
+
+#[test]
+fn what_is_declared_is_read_and_checked() {
+    let declared = good()
+        .replacen("[[camera]]\n", "[board.certificate]\nscale_ppm_sd = 20.0\n[[camera]]\noptics = \"mirror\"\nserial = \"SN 7\"\n", 1)
+        + "[recording]\nname = \"line 3\"\ndate = \"2026-11-30\"\n";
+    let folder = folder(&declared);
+    let dataset = Dataset::load(folder.path()).unwrap();
+    assert_eq!(dataset.cameras[0].optics, Some(ExpectedOptics::Mirror));
+    assert_eq!(dataset.cameras[0].serial.as_deref(), Some("SN 7"));
+    assert_eq!(dataset.cameras[1].optics, None);
+    assert_eq!(dataset.certificate.unwrap().scale_ppm_sd, Some(20.0));
+    assert_eq!(dataset.recording.unwrap().name.as_deref(), Some("line 3"));
+
+    let with = |from: &str, to: &str| refused(&declared.replace(from, to));
+    assert_says(&with("20.0", "-1.0"), &["scale_ppm_sd = -1"]);
+    assert_says(&with("2026-11-30", "30.11."), &["date = \"30.11.\""]);
+    assert_says(&with("\"mirror\"", "\"miror\""), &["unknown variant", "mirror"]);
+    assert_says(&with("scale_ppm_sd", "scale_sd"), &["unknown field"]);
 }

@@ -17,11 +17,15 @@ fn dataset(names: &[&str]) -> Dataset {
                 name: (*name).to_owned(),
                 sensor: SensorSize::new(640, 480),
                 images: Vec::new(),
+                optics: None,
+                serial: None,
             })
             .collect(),
         stage: None,
         excluded_poses: [].into(),
         target: None,
+        certificate: None,
+        recording: None,
     }
 }
 

@@ -90,6 +90,8 @@ fn real_images_are_found_whole() {
         name: name.to_string(),
         sensor: SENSOR,
         images: images(name),
+        optics: None,
+        serial: None,
     };
     let dataset = Dataset {
         folder: folder.clone(),
@@ -98,6 +100,8 @@ fn real_images_are_found_whole() {
         stage: None,
         excluded_poses: std::collections::BTreeSet::new(),
         target: None,
+        certificate: None,
+        recording: None,
     };
     let detection = detect(&dataset).unwrap();
     assert_eq!(detection.views.len(), 26);

@@ -41,6 +41,8 @@ fn dataset(folder: &Path, board: BoardSpec, stage: bool, cameras: &[Vec<Photo>])
                     Some(path)
                 })
                 .collect(),
+            optics: None,
+            serial: None,
         })
         .collect();
     Dataset {
@@ -50,6 +52,8 @@ fn dataset(folder: &Path, board: BoardSpec, stage: bool, cameras: &[Vec<Photo>])
         stage: stage.then(StageSpec::default),
         excluded_poses: std::collections::BTreeSet::new(),
         target: None,
+        certificate: None,
+        recording: None,
     }
 }
 
