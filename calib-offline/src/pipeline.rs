@@ -21,6 +21,7 @@ use calib_estimate::adjust::Observations;
 use calib_judge::agreement::{Whole, agreement};
 use calib_judge::half_data::splits;
 use calib_judge::held_out::folds_wanted;
+use calib_judge::plausibility::Sheet;
 use calib_judge::verdict::Thresholds;
 use calib_judge::{Folds, held_out};
 use calib_rays::field::RayTable;
@@ -159,7 +160,7 @@ pub fn calibrate_corners(
     });
     let halves: &[_] = if settings.folds > 0 { &halves } else { &[] };
     progress.begin("cross-checks", folds);
-    let (folds, (checks, mut causes)) = rayon::join(
+    let (folds, (checks, causes)) = rayon::join(
         || fit_folds(settings.method, &given, used, folds, progress),
         || {
             rayon::join(
@@ -169,7 +170,8 @@ pub fn calibrate_corners(
         },
     );
     progress.end();
-    calib_judge::cause::sort(&mut causes);
+    let sheet = Sheet::of(dataset, &views);
+    let causes = sheet.with_suspects(causes);
     let whole = Whole {
         rig: &solution.rig,
         board_shape: &solution.board_shape,
@@ -188,6 +190,7 @@ pub fn calibrate_corners(
         left_open_mm: solution.own.left_open_mm(&solution.rig),
         checks: checks.as_ref(),
         causes: &causes,
+        explained: &sheet.explained,
         thresholds: &settings.thresholds,
     });
     Ok(Checked {

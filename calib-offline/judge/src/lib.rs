@@ -12,6 +12,7 @@ pub mod held_out;
 pub mod known_points;
 pub mod measured_board;
 pub mod neighbor_noise;
+pub mod plausibility;
 pub mod stage_axis;
 mod suspect_words;
 pub mod suspects;

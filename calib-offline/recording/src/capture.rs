@@ -2,7 +2,6 @@
 //! corners were seen, and which shot to add.
 
 use crate::dataset::{Dataset, check_sufficiency};
-use crate::detect::suspicion::turns_like_image;
 use calib_rays::field::CoverageMask;
 use calib_rays::geometry::{PixelPoint, SensorSize};
 use calib_rays::observed::{Corner, View, poses};
@@ -95,7 +94,6 @@ impl Capture {
             ));
         }
         warnings.extend(board_warning(dataset, views));
-        warnings.extend(mirror_warning(dataset, views));
         for (camera, spec) in self.cameras.iter().zip(&dataset.cameras) {
             warnings.extend(camera.warning(spec.sensor, views_reach(dataset, views, &camera.name)));
         }
@@ -144,19 +142,6 @@ impl CameraCapture {
             )
         })
     }
-}
-
-/// Views whose labels turn the other way than the image does.
-fn mirror_warning(dataset: &Dataset, views: &[View]) -> Option<String> {
-    let mirrored = |view: &&View| turns_like_image(&view.corners) == Some(false);
-    let first = views.iter().find(mirrored)?;
-    Some(format!(
-        "{} of {} views number the board as a mirror would show it (columns and rows turn against u and v; the first is camera {}, pose {}); they are taken as numbered so on purpose, and the cameras to see the board directly",
-        views.iter().filter(mirrored).count(),
-        views.len(),
-        dataset.cameras[first.camera_idx].name,
-        first.pose
-    ))
 }
 
 fn camera_capture<'a>(
@@ -308,21 +293,6 @@ mod tests {
             warnings(&views)
                 .iter()
                 .any(|w| w.contains("3 rows and 4 cols"))
-        );
-    }
-
-    #[test]
-    fn labels_as_in_a_mirror_show() {
-        let mut views = views(12, [5.0, 5.0, 890.0, 590.0]);
-        for corner in views.iter_mut().flat_map(|view| &mut view.corners) {
-            corner.pixel.u = 899.0 - corner.pixel.u;
-        }
-        let all = warnings(&views);
-        assert_eq!(all.len(), 1);
-        assert!(
-            all[0].contains("12 of 12 views number the board"),
-            "{}",
-            all[0]
         );
     }
 

@@ -3,6 +3,7 @@
 use super::error::Error;
 use super::output::{Console, Paint};
 use super::settings::{Narration, Settings};
+use calib_judge::Cause;
 use calib_rays::remedy::Remedy;
 use serde::Serialize;
 use std::error::Error as _;
@@ -17,6 +18,8 @@ struct ErrorObject {
     /// From what was attempted to the innermost cause.
     error: Vec<String>,
     remedy: Option<String>,
+    /// What is wrong with the recording, most likely first.
+    causes: Vec<Cause>,
 }
 
 const SCHEMA: &str = "calib-offline/error/1";
@@ -49,6 +52,7 @@ pub(super) fn of_command(error: &Error, console: &Console) -> ExitCode {
             exit_code,
             error: chain,
             remedy,
+            causes: error.causes(),
         };
         console.result("", &object);
     }
@@ -79,6 +83,7 @@ pub(super) fn of_arguments(
             exit_code: 2,
             error: lines.take(1).map(str::to_owned).collect(),
             remedy: Some("see calib-offline --help".to_owned()),
+            causes: Vec::new(),
         };
         console.result("", &object);
     }

@@ -9,6 +9,8 @@ use super::usage_error::UsageError;
 use crate::present::numbers::short;
 use crate::report::facts::Facts;
 use crate::report::text::summary;
+use calib_judge::Cause;
+use calib_judge::plausibility::{Dial, Sheet};
 use calib_recording::capture::Capture;
 use calib_recording::dataset::Dataset;
 use calib_recording::dataset::identity::hex;
@@ -37,6 +39,11 @@ With --json, kind dataset of schema calib-offline/inspect/1:
   capture (poses, poses_seen_by_all, cameras (name, views, corners, corners_per_view,
     covered_share, corners_per_ninth), warnings)
              null before detect; corners_per_view: least, median, most
+  dial (counterclockwise, rms_deg, largest_deg)
+             null without [stage] angles_deg; the sense that larger readings turn the board in, seen
+             from above in the first camera's image; found minus dialed
+  causes (cause, since_pose, size, cost_mm, text, grade)
+             what is wrong on its face, most likely first; as calibrate has them
 With --json, kind calibration of schema calib-offline/inspect/1:
   kind, tool_version, method, input_sha256, the facts of calibrate
 With --json, kind blob of schema calib-offline/inspect/1:
@@ -81,6 +88,8 @@ struct DatasetObject {
     source: &'static str,
     cameras: Vec<DatasetCamera>,
     capture: Option<Capture>,
+    dial: Option<Dial>,
+    causes: Vec<Cause>,
 }
 
 #[derive(Debug, Serialize)]
@@ -201,10 +210,9 @@ fn dataset_object(path: &Path) -> Result<DatasetObject, Error> {
         (true, false) => "corners",
         (false, _) => "images",
     };
-    let capture = corners.map(|views| {
-        let selection = without_excluded(views, &dataset.excluded_poses);
-        Capture::of(&dataset, &selection.used)
-    });
+    let used = corners.map(|views| without_excluded(views, &dataset.excluded_poses).used);
+    let capture = used.as_ref().map(|used| Capture::of(&dataset, used));
+    let sheet = used.map_or_else(Sheet::default, |used| Sheet::of(&dataset, &used));
     Ok(DatasetObject {
         rows: dataset.board.rows,
         cols: dataset.board.cols,
@@ -222,6 +230,8 @@ fn dataset_object(path: &Path) -> Result<DatasetObject, Error> {
             })
             .collect(),
         capture,
+        dial: sheet.dial,
+        causes: sheet.causes,
         folder: dataset.folder,
     })
 }
@@ -277,6 +287,17 @@ fn dataset_words(object: &DatasetObject) -> String {
     }
     for warning in &capture.warnings {
         let _ = writeln!(words, "look at         {warning}");
+    }
+    if let Some(dial) = &object.dial {
+        let _ = writeln!(
+            words,
+            "dial            larger readings turn the board {}, seen from above; found minus dialed {:.2} degrees RMS",
+            dial.sense(),
+            dial.rms_deg
+        );
+    }
+    for cause in &object.causes {
+        let _ = writeln!(words, "{:<15} {}", cause.code.word(), cause.text);
     }
     words
 }

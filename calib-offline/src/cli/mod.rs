@@ -12,6 +12,7 @@ mod detect_image;
 pub mod detect_target;
 pub mod device;
 pub mod error;
+mod error_causes;
 pub mod evaluate;
 pub mod export;
 mod failure;

@@ -1,10 +1,10 @@
 //! Why a dataset gives no calibration.
 
 use crate::methods::MethodError;
+use calib_judge::Cause;
 use calib_rays::remedy::Remedy;
 use calib_recording::dataset::{CornersError, SufficiencyError};
 use calib_recording::detect::DetectError;
-use calib_recording::detect::suspicion::LabelSuspicion;
 
 /// Why a dataset gives no calibration.
 #[derive(Debug, thiserror::Error)]
@@ -34,11 +34,13 @@ pub enum CalibrateError {
         /// What is missing.
         source: SufficiencyError,
     },
-    /// Labels that contradict each other, found after no method had an answer.
-    #[error("the corners do not belong together as they are labelled: {suspicion}")]
-    Labels {
-        /// What is suspected.
-        suspicion: LabelSuspicion,
+    /// A recording that contradicts itself, looked at after no method had an answer.
+    #[error("the recording contradicts itself: {}", first.text)]
+    Implausible {
+        /// What explains the failure best.
+        first: Box<Cause>,
+        /// All that was found, that one first.
+        causes: Vec<Cause>,
         /// The failure that it explains.
         source: MethodError,
     },
@@ -65,7 +67,7 @@ impl CalibrateError {
             Self::Detect(error) => matches!(error, DetectError::Consistency(_)),
             Self::Sufficiency(_)
             | Self::FewImages { .. }
-            | Self::Labels { .. }
+            | Self::Implausible { .. }
             | Self::Method(_) => true,
         }
     }
@@ -83,7 +85,9 @@ impl Remedy for CalibrateError {
                  --overlay DIR gives the reason for every image"
                     .to_owned(),
             ),
-            Self::Labels { suspicion, .. } => suspicion.remedy(),
+            Self::Implausible { .. } => Some(
+                "correct that first; calib-offline inspect DATASET says what else is to be seen".to_owned(),
+            ),
             Self::Method(error) => error.remedy(),
         }
     }

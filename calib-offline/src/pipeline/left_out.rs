@@ -4,6 +4,7 @@ use super::parts::Parts;
 use crate::methods::solution::{Unused, unused};
 use crate::report::record::{LeftOut, Renumbered};
 use calib_estimate::init::screening::{Finding, FindingKind};
+use calib_judge::plausibility::Explained;
 use calib_recording::detect::verdict::Outcome;
 
 /// Poses, views and corners that did not go in.
@@ -73,7 +74,7 @@ pub fn left_out(parts: &Parts, names: &[String]) -> Vec<LeftOut> {
             .solution
             .findings
             .iter()
-            .filter_map(|f| screened_out(f, names)),
+            .filter_map(|f| screened_out(f, parts.explained, names)),
     );
     for image in parts.corners.detection.iter().flat_map(|d| &d.images) {
         if let Outcome::Refused(refusal) = &image.outcome {
@@ -89,7 +90,7 @@ pub fn left_out(parts: &Parts, names: &[String]) -> Vec<LeftOut> {
 }
 
 /// What the screening left out; `None` for a view that is used as it should be.
-fn screened_out(finding: &Finding, names: &[String]) -> Option<LeftOut> {
+fn screened_out(finding: &Finding, explained: &[Explained], names: &[String]) -> Option<LeftOut> {
     let (corner_count, reason) = match &finding.kind {
         FindingKind::Misfit {
             median_px,
@@ -109,9 +110,9 @@ fn screened_out(finding: &Finding, names: &[String]) -> Option<LeftOut> {
             0,
             format!(
                 "not the same board position as in camera {} ({misfit_px:.2} px apart, other pairs \
-                 {typical_px:.2} px): not exposed at the same instant; left out as a pair, each \
-                 view used for its own camera",
-                names[*other_camera_idx]
+                 {typical_px:.2} px): {}; left out as a pair, each view used for its own camera",
+                names[*other_camera_idx],
+                why_apart(finding, explained, names)
             ),
         ),
         FindingKind::Renumbered { .. } => return None,
@@ -122,6 +123,18 @@ fn screened_out(finding: &Finding, names: &[String]) -> Option<LeftOut> {
         corner_count,
         reason,
     })
+}
+
+/// Another reading of one of the two views, if one makes them fit.
+fn why_apart(finding: &Finding, explained: &[Explained], names: &[String]) -> String {
+    let mut of_pose = explained.iter().filter(|view| view.pose == finding.pose);
+    of_pose.next().map_or_else(
+        || "not exposed at the same instant".to_owned(),
+        |view| {
+            let camera = &names[view.camera_idx];
+            format!("they fit with that of camera {camera} {}", view.reading)
+        },
+    )
 }
 
 /// Views whose board was numbered from the other end.

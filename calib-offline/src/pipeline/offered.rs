@@ -4,12 +4,13 @@ use super::corners::Corners;
 use super::error::{CalibrateError, NoSuchPose};
 use crate::methods::MethodError;
 use calib_estimate::adjust::Observations;
+use calib_judge::plausibility::Sheet;
+use calib_judge::verdict::Grade;
 use calib_rays::observed::View;
 use calib_recording::dataset::Dataset;
 use calib_recording::dataset::split::without_excluded;
 use calib_recording::dataset::sufficiency::{SufficiencyError, check_sufficiency};
 use calib_recording::detect;
-use calib_recording::detect::suspicion::suspicious_labels;
 use calib_recording::detect::verdict::Outcome;
 
 /// What a dataset offers to any method.
@@ -37,11 +38,13 @@ pub fn offered(dataset: &Dataset, corners: &Corners) -> Result<Offered, Calibrat
     })
 }
 
-/// Why no method had an answer: labels that contradict each other, if they explain it.
+/// Why no method had an answer: what is wrong with the recording on its face, if anything is.
 pub fn explained(error: MethodError, dataset: &Dataset, used: &[View]) -> CalibrateError {
-    match suspicious_labels(dataset, used) {
-        Some(suspicion) => CalibrateError::Labels {
-            suspicion,
+    let causes = Sheet::of(dataset, used).causes;
+    match causes.first().filter(|cause| cause.grade > Grade::Pass) {
+        Some(first) => CalibrateError::Implausible {
+            first: Box::new(first.clone()),
+            causes,
             source: error,
         },
         None => error.into(),

@@ -4,6 +4,7 @@ use super::Corners;
 use crate::methods::Solution;
 use calib_estimate::adjust::Observations;
 use calib_judge::agreement::Agreement;
+use calib_judge::plausibility::Explained;
 use calib_judge::verdict::Thresholds;
 use calib_judge::{Cause, CrossChecks, HeldOut};
 use calib_recording::dataset::Dataset;
@@ -30,6 +31,8 @@ pub struct Parts<'a> {
     pub checks: Option<&'a CrossChecks>,
     /// What was found about the recording, most likely first.
     pub causes: &'a [Cause],
+    /// Views that are meant otherwise than they are written.
+    pub explained: &'a [Explained],
     /// What counts as good.
     pub thresholds: &'a Thresholds,
 }

@@ -1,6 +1,7 @@
 //! The report page: one HTML file that needs nothing else, no network and no scripts.
 
 use super::BlobFacts;
+use super::causes_page;
 use super::choices_page;
 use super::facts::Facts;
 use super::left_out_page;
@@ -35,6 +36,7 @@ pub fn page(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
                 main {
                     h1 { (title) }
                     (verdict(&facts))
+                    (causes_page::draw(calibration))
                     (headline(calibration, &facts, blob))
                     (figures(calibration))
                     @if let Some(blob) = blob {

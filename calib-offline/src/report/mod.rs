@@ -1,6 +1,7 @@
 //! What a calibration says of itself: `calibration.json` and the report page. Computes nothing new.
 
 pub mod blob_facts;
+mod causes_page;
 mod choices_page;
 pub mod facts;
 pub mod html;

@@ -3,7 +3,7 @@
 use super::BlobFacts;
 use super::facts::Facts;
 use super::procedure;
-use super::record::Calibration;
+use super::record::{Calibration, Grade};
 use super::words;
 use crate::present::numbers::short;
 use std::fmt::Write as _;
@@ -13,6 +13,18 @@ pub fn summary(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
     let facts = Facts::of(calibration);
     let mut lines: Vec<(&str, String)> = vec![("verdict", facts.verdict.word().to_owned())];
     lines.extend(facts.reasons.iter().map(|reason| ("", reason.clone())));
+    // What lowers the grade stands among the reasons.
+    for cause in &calibration.causes {
+        let text = match cause.grade {
+            Grade::Pass => cause.text.clone(),
+            _ => format!(
+                "{}, see above; costs {} mm",
+                cause.size,
+                short(cause.cost_mm)
+            ),
+        };
+        lines.push(("found", format!("{}: {text}", cause.code.word())));
+    }
     lines.push(("held-out error", held_out(calibration, &facts)));
     lines.push((
         "corner noise",

@@ -13,9 +13,7 @@ pub mod sufficiency;
 pub mod target;
 
 pub use corners::{CornersError, load_corners, write_corners};
-pub use description::{
-    CameraSpec, Certificate, Dataset, ExpectedOptics, RecordingSpec, StageSpec,
-};
+pub use description::{CameraSpec, Certificate, Dataset, ExpectedOptics, RecordingSpec, StageSpec};
 pub use identity::input_sha256;
 pub use manifest::ManifestError;
 pub use markers::load_markers;

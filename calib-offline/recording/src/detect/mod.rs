@@ -25,7 +25,7 @@ pub mod overlay;
 mod pair_check;
 pub mod ring_target;
 mod settings;
-pub mod suspicion;
+pub mod turning;
 pub mod verdict;
 
 pub use detection::{Detection, TurnedImage};

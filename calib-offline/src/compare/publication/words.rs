@@ -269,8 +269,6 @@ mod tests {
             spread: None,
             stage_angles: None,
             target: None,
-            certificate: None,
-            recording: None,
             known_points: None,
             left_out: Vec::new(),
         }

@@ -88,7 +88,13 @@ mod tests {
     #[test]
     fn dates_are_year_month_day() {
         assert!(is_date("2026-11-30"));
-        for wrong in ["30.11.2026", "2026-13-01", "2026-1-1", "2026-11-32", "2026-11"] {
+        for wrong in [
+            "30.11.2026",
+            "2026-13-01",
+            "2026-1-1",
+            "2026-11-32",
+            "2026-11",
+        ] {
             assert!(!is_date(wrong), "{wrong}");
         }
     }

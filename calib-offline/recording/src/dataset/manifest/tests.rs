@@ -314,6 +314,9 @@ fn what_is_declared_is_read_and_checked() {
     let with = |from: &str, to: &str| refused(&declared.replace(from, to));
     assert_says(&with("20.0", "-1.0"), &["scale_ppm_sd = -1"]);
     assert_says(&with("2026-11-30", "30.11."), &["date = \"30.11.\""]);
-    assert_says(&with("\"mirror\"", "\"miror\""), &["unknown variant", "mirror"]);
+    assert_says(
+        &with("\"mirror\"", "\"miror\""),
+        &["unknown variant", "mirror"],
+    );
     assert_says(&with("scale_ppm_sd", "scale_sd"), &["unknown field"]);
 }

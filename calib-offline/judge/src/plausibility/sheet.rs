@@ -1,0 +1,185 @@
+//! All checks that need no fit, put into one list.
+
+use super::duplicates::{Duplicates, duplicates};
+use super::finding::{Explained, cause, pose_list};
+use super::handedness::Hands;
+use super::look::Look;
+use super::placed::Placed;
+use super::reading::Reading;
+use super::single_views::{Explanation, explain};
+use super::stage_angles::{Dial, dial};
+use super::whole_camera::{WholeCamera, is_possible, read_camera};
+use super::{geometry, mirrored, numbering, sides, units};
+use crate::cause::{Cause, Code, sort};
+use crate::verdict::Grade;
+use calib_rays::geometry::RigidTransform;
+use calib_rays::observed::{View, poses};
+use calib_recording::dataset::{Dataset, stage};
+use nalgebra::Vector3;
+use std::collections::BTreeMap;
+
+/// What can be seen of a recording before a fit.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Sheet {
+    /// What was found, most likely first; empty when nothing was.
+    pub causes: Vec<Cause>,
+    /// Views that are meant otherwise than they are written.
+    pub explained: Vec<Explained>,
+    /// How the stage's dial counts, where there is one and the boards turned.
+    pub dial: Option<Dial>,
+}
+
+impl Sheet {
+    /// Looks at the views of a dataset, those of excluded poses not among them.
+    pub fn of(dataset: &Dataset, views: &[View]) -> Self {
+        let look = Look::at(dataset, views);
+        let hands = Hands::of(&look);
+        let cameras: Vec<WholeCamera> = (1..dataset.cameras.len())
+            .filter_map(|camera_idx| {
+                let most_pairs = |reference: &usize| look.pairs(*reference, camera_idx, 0).len();
+                let reference = (0..camera_idx).rev().max_by_key(most_pairs)?;
+                read_camera(&look, &hands, reference, camera_idx)
+            })
+            .collect();
+        let mut sheet = Self::default();
+        for whole in &cameras {
+            sheet
+                .causes
+                .extend(whole_camera_cause(&look, &hands, whole));
+            sheet.add_single_views(&look, explain(&look, &hands, whole));
+        }
+        sheet
+            .causes
+            .extend(mirrored::everywhere(&look, &hands, &cameras));
+        let explained: Vec<(usize, usize)> = sheet
+            .explained
+            .iter()
+            .map(|view| (view.pose, view.camera_idx))
+            .collect();
+        sheet
+            .causes
+            .extend(mirrored::some_views(&look, &hands, &explained));
+        if hands.any_camera() {
+            sheet.causes.extend(sides::sides(&look, &cameras));
+        }
+        sheet.causes.extend(units::units(&look, &cameras));
+        let Duplicates { causes, same_as } = duplicates(&look);
+        sheet.causes.extend(causes);
+        let placed = Placed::of(&look, &cameras);
+        if let Some(found) = geometry::geometry(&look, &placed, &same_as) {
+            sheet.causes.extend(geometry::causes(&found));
+        }
+        let all = poses(views);
+        let boards: Vec<(usize, RigidTransform)> = placed
+            .rig_from_board
+            .iter()
+            .enumerate()
+            .filter_map(|(idx, board)| Some((look.pose(idx), (*board)?)))
+            .collect();
+        let entry = |pose| stage::entry(dataset, &all, pose);
+        if let Some((dial, cause)) = dial(&boards, &-Vector3::y(), entry) {
+            sheet.dial = Some(dial);
+            sheet.causes.extend(cause);
+        }
+        sheet.causes.extend(numbering::from_one(&look));
+        sort(&mut sheet.causes);
+        sheet
+    }
+
+    /// One cause for views of a camera that are to be read alike.
+    fn add_single_views(&mut self, look: &Look<'_>, found: Vec<Explanation>) {
+        let mut alike: BTreeMap<(usize, Code, String), Vec<Explanation>> = BTreeMap::new();
+        for explanation in found {
+            let Explained {
+                camera_idx,
+                code,
+                reading,
+                ..
+            } = &explanation.explained;
+            let kind = (*camera_idx, *code, reading.clone());
+            alike.entry(kind).or_default().push(explanation);
+        }
+        for ((camera_idx, code, reading), found) in alike {
+            let poses: Vec<usize> = found.iter().map(|one| one.explained.pose).collect();
+            let middle = &found[found.len() / 2].misfit_px;
+            // Views from the other end are renumbered, and then as good as the others.
+            let (grade, text) = match code {
+                Code::LabelsTurned => (
+                    Grade::Pass,
+                    format!("so they fit to {:.2} px, and so they are used", middle[1]),
+                ),
+                _ => (
+                    Grade::Doubtful,
+                    format!(
+                        "so they fit those of the other camera to {:.2} px, as recorded they miss by {:.2} px; \
+                         correct the labels or the order of the images",
+                        middle[1], middle[0]
+                    ),
+                ),
+            };
+            self.causes.push(Cause {
+                since_pose: poses.first().copied(),
+                ..cause(
+                    code,
+                    grade,
+                    format!("{} of {} poses", poses.len(), look.observations.poses.len()),
+                    0.0,
+                    format!(
+                        "camera {} in {}: {reading}: {text}",
+                        look.name(camera_idx),
+                        pose_list(&poses)
+                    ),
+                )
+            });
+            self.explained
+                .extend(found.into_iter().map(|one| one.explained));
+        }
+    }
+}
+
+/// A camera all of whose views are meant otherwise.
+fn whole_camera_cause(look: &Look<'_>, hands: &Hands, whole: &WholeCamera) -> Option<Cause> {
+    let [reference, camera] = [whole.reference, whole.camera_idx].map(|idx| look.name(idx));
+    let fits = format!(
+        "so they fit to {:.2} px, as recorded they miss by {:.2} px in the middle pose",
+        whole.agreed.typical_px, whole.as_recorded_px
+    );
+    if whole.steps != 0 {
+        return Some(cause(
+            Code::PoseNumbering,
+            Grade::Fail,
+            format!("{:+} poses", whole.steps),
+            0.0,
+            format!(
+                "pose k of camera {camera} seems to be pose k {:+} of camera {reference}: {fits}; number the \
+                 poses alike in both cameras, an image may be missing in one of them",
+                whole.steps
+            ),
+        ));
+    }
+    if whole.reading == Reading::AsRecorded {
+        return None;
+    }
+    // The same fits if the other camera's views are read the other way round.
+    let own = is_possible(look, whole.camera_idx, whole.reading);
+    let blame_reference = if whole.reading.mirrors() {
+        !hands.camera(whole.reference)
+    } else {
+        !own && is_possible(look, whole.reference, whole.reading.inverse())
+    };
+    let (camera, other, reading) = if blame_reference {
+        (reference, camera, whole.reading.inverse())
+    } else {
+        (camera, reference, whole.reading)
+    };
+    Some(cause(
+        reading.code(),
+        Grade::Fail,
+        "all views".to_owned(),
+        0.0,
+        format!(
+            "the views of camera {camera} belong to those of camera {other} {reading}: {fits}; correct \
+             corners.csv, or use images as they came from the sensor"
+        ),
+    ))
+}
