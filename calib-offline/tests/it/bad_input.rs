@@ -432,15 +432,19 @@ fn labels_that_do_not_belong_together() {
         Some((camera, pose, row, col, u, v))
     });
     let folder = dataset(MANIFEST, mirrored.as_bytes());
+    let says = "the views of camera left belong to those of camera right with u counted from the right";
     run(folder.path(), &["calibrate", "set", "-o", "out"])
         .assert_code(3)
-        .assert_says(&["mirrored in pose 0", "try: number rows and columns alike"]);
+        .assert_says(&[says, "try: correct that first"]);
     run(folder.path(), &["methods", "set"])
         .assert_code(3)
-        .assert_says(&["mirrored in pose 0", "try: number rows and columns alike"]);
-    let inspected = run(folder.path(), &["inspect", "set"]);
-    let words = "6 of 12 views number the board as a mirror would";
-    assert!(inspected.stdout.contains(words), "{}", inspected.stdout);
+        .assert_says(&[says]);
+    let refused = run(folder.path(), &["calibrate", "set", "-o", "out", "--json"]).json();
+    let inspected = run(folder.path(), &["inspect", "set", "--json"]).json();
+    assert_eq!(refused["causes"], inspected["causes"]);
+    assert_eq!(refused["causes"][0]["cause"], "labels-mirrored");
+    let words = run(folder.path(), &["inspect", "set"]).stdout;
+    assert!(words.contains(says), "{words}");
 }
 
 /// A camera whose board is numbered from the other end is not refused: the turn is undone, and
