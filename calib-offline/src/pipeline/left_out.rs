@@ -99,7 +99,10 @@ fn screened_out(finding: &Finding, explained: &[Explained], names: &[String]) ->
             finding.corner_count,
             format!(
                 "the whole view misses by {median_px:.2} px (median; {typical_px:.2} px in other \
-                 views): the board moved during the exposure, is bent, or is another one"
+                 views): {}",
+                reading_that_fits(finding, explained, names).unwrap_or_else(|| {
+                    "the board moved during the exposure, is bent, or is another one".to_owned()
+                })
             ),
         ),
         FindingKind::Unsynchronized {
@@ -112,7 +115,8 @@ fn screened_out(finding: &Finding, explained: &[Explained], names: &[String]) ->
                 "not the same board position as in camera {} ({misfit_px:.2} px apart, other pairs \
                  {typical_px:.2} px): {}; left out as a pair, each view used for its own camera",
                 names[*other_camera_idx],
-                why_apart(finding, explained, names)
+                reading_that_fits(finding, explained, names)
+                    .unwrap_or_else(|| "not exposed at the same instant".to_owned())
             ),
         ),
         FindingKind::Renumbered { .. } => return None,
@@ -125,16 +129,18 @@ fn screened_out(finding: &Finding, explained: &[Explained], names: &[String]) ->
     })
 }
 
-/// Another reading of one of the two views, if one makes them fit.
-fn why_apart(finding: &Finding, explained: &[Explained], names: &[String]) -> String {
-    let mut of_pose = explained.iter().filter(|view| view.pose == finding.pose);
-    of_pose.next().map_or_else(
-        || "not exposed at the same instant".to_owned(),
-        |view| {
-            let camera = &names[view.camera_idx];
-            format!("they fit with that of camera {camera} {}", view.reading)
-        },
-    )
+/// Another reading of one of the pose's views, if one makes them fit.
+fn reading_that_fits(
+    finding: &Finding,
+    explained: &[Explained],
+    names: &[String],
+) -> Option<String> {
+    let view = explained.iter().find(|view| view.pose == finding.pose)?;
+    let camera = &names[view.camera_idx];
+    Some(format!(
+        "they fit with that of camera {camera} {}",
+        view.reading
+    ))
 }
 
 /// Views whose board was numbered from the other end.

@@ -432,7 +432,8 @@ fn labels_that_do_not_belong_together() {
         Some((camera, pose, row, col, u, v))
     });
     let folder = dataset(MANIFEST, mirrored.as_bytes());
-    let says = "the views of camera left belong to those of camera right with u counted from the right";
+    let says =
+        "the views of camera left belong to those of camera right with u counted from the right";
     run(folder.path(), &["calibrate", "set", "-o", "out"])
         .assert_code(3)
         .assert_says(&[says, "try: correct that first"]);

@@ -26,6 +26,8 @@ const TOO_ALIKE: f64 = 2.0;
 /// Where that is so, and boards at other distances lower it by more than their number does and a fifth,
 /// distances are alike besides.
 const ONE_DEPTH: f64 = 1.2;
+/// So they are if they differ by less than this share: boards across the view at one distance do.
+const ONE_PLACE: f64 = 0.05;
 /// Fewer different poses than this leave each half of them without one to spare.
 const FEW_POSES: usize = 8;
 /// Points are asked for at so many pixels.
@@ -37,10 +39,12 @@ pub struct Geometry {
     pub poses: usize,
     /// Angles between the boards' normals and the middle one: RMS, degrees.
     pub tilt_rms_deg: f64,
-    /// Nearest, middle and farthest board's middle, mm.
+    /// Nearest, middle and farthest board's middle along the first camera's axis, mm.
     pub distance_mm: [f64; 3],
     /// RMS error that the calibration leaves in points, mm, for lenses of nine numbers.
     pub error_mm: f64,
+    /// The same per px of corner noise.
+    pub error_mm_per_px: f64,
     /// Proposals: what to record, by how much the error falls.
     pub proposals: Vec<(Proposal, f64)>,
 }
@@ -126,7 +130,7 @@ pub fn geometry(look: &Look<'_>, placed: &Placed, same_as: &[usize]) -> Option<G
         boards.push(rig_from_board);
     }
     let middle = board.center_in_board();
-    let distances = || boards.iter().map(|b| b.point(&middle).norm());
+    let distances = || boards.iter().map(|b| b.point(&middle).z.abs());
     let distance_mm = [
         distances().fold(f64::INFINITY, f64::min),
         median(distances())?,
@@ -160,6 +164,7 @@ pub fn geometry(look: &Look<'_>, placed: &Placed, same_as: &[usize]) -> Option<G
         tilt_rms_deg: calib_rays::numerics::rms(&tilts)?,
         distance_mm,
         error_mm: error * sigma_px,
+        error_mm_per_px: error,
         proposals,
     })
 }
@@ -251,49 +256,7 @@ fn asked(look: &Look<'_>, [nearest, middle, farthest]: [f64; 3]) -> Vec<Vector3<
 pub fn causes(found: &Geometry) -> Vec<Cause> {
     let mut causes = Vec::new();
     let by_number = ((found.poses + 2) as f64 / found.poses as f64).sqrt();
-    let best = found
-        .proposals
-        .iter()
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-        .filter(|(_, gain)| *gain > TOO_ALIKE * by_number);
     let [nearest, middle, farthest] = found.distance_mm;
-    if let Some((proposal, gain)) = best {
-        let text = |what: String| {
-            format!(
-                "{what}: they leave {} mm RMS in points (for lenses of nine numbers); {}: {} mm then",
-                digits(found.error_mm),
-                proposal.words(middle),
-                digits(found.error_mm / gain)
-            )
-        };
-        let few = cause(
-            Code::FewTilts,
-            Grade::Doubtful,
-            format!("{:.1} degrees RMS", found.tilt_rms_deg),
-            found.error_mm,
-            text(format!(
-                "the {} boards are tilted against each other by {:.1} degrees RMS",
-                found.poses, found.tilt_rms_deg
-            )),
-        );
-        let by_distance = found.proposals.iter().any(|(proposal, gain)| {
-            *proposal == Proposal::OtherDistances && *gain > ONE_DEPTH * by_number
-        });
-        if by_distance {
-            causes.push(cause(
-                Code::OneDepth,
-                Grade::Doubtful,
-                format!("{} to {}", length(nearest), length(farthest)),
-                found.error_mm,
-                text(format!(
-                    "all boards stand at one distance, {} to {}, and face the camera alike",
-                    length(nearest),
-                    length(farthest)
-                )),
-            ));
-        }
-        causes.push(few);
-    }
     if found.poses < FEW_POSES {
         causes.push(cause(
             Code::FewPoses,
@@ -301,11 +264,54 @@ pub fn causes(found: &Geometry) -> Vec<Cause> {
             format!("{} poses", found.poses),
             found.error_mm,
             format!(
-                "{} different poses are few: half of them give hardly a calibration to compare with; record {} \
-                 or more, at other tilts and distances",
-                found.poses, FEW_POSES
+                "{} different poses are few: half of them give hardly a calibration to compare with; record \
+                 {FEW_POSES} or more, at other tilts and distances",
+                found.poses
             ),
         ));
     }
+    let best = found
+        .proposals
+        .iter()
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .filter(|(_, gain)| *gain > TOO_ALIKE * by_number);
+    // Boards that are tilted more than what is proposed lack something else.
+    let Some((proposal, gain)) = best.filter(|_| found.tilt_rms_deg < TILT_DEG) else {
+        return causes;
+    };
+    let text = |what: String| {
+        format!(
+            "{what}: they leave {} mm RMS in points (for lenses of nine numbers); {}: {} mm then",
+            digits(found.error_mm),
+            proposal.words(middle),
+            digits(found.error_mm / gain)
+        )
+    };
+    let would_help = found.proposals.iter().any(|(proposal, gain)| {
+        *proposal == Proposal::OtherDistances && *gain > ONE_DEPTH * by_number
+    });
+    if would_help || farthest - nearest < ONE_PLACE * middle {
+        causes.push(cause(
+            Code::OneDepth,
+            Grade::Doubtful,
+            format!("{} to {}", length(nearest), length(farthest)),
+            found.error_mm,
+            text(format!(
+                "all boards stand at one distance, {} to {}, and face the camera alike",
+                length(nearest),
+                length(farthest)
+            )),
+        ));
+    }
+    causes.push(cause(
+        Code::FewTilts,
+        Grade::Doubtful,
+        format!("{:.1} degrees RMS", found.tilt_rms_deg),
+        found.error_mm,
+        text(format!(
+            "the {} boards are tilted against each other by {:.1} degrees RMS",
+            found.poses, found.tilt_rms_deg
+        )),
+    ));
     causes
 }

@@ -7,6 +7,7 @@ use calib_estimate::init::board_pose::{ViewFit, fit_view};
 use calib_estimate::init::focal_scan::start_camera;
 use calib_rays::board::BoardShape;
 use calib_rays::field::RayField;
+use calib_rays::geometry::PixelPoint;
 use calib_rays::numerics::median;
 use calib_rays::observed::View;
 use calib_recording::dataset::Dataset;
@@ -24,7 +25,8 @@ pub struct Look<'a> {
     pub observations: Observations,
     /// Per camera; `None` where no lens explains its corners.
     pub cameras: Vec<Option<CameraLook>>,
-    /// Per view of the observations; `None` where the camera has no start, or the view places no board.
+    /// Per view of the observations; `None` where the camera has no start, the view places no board or
+    /// fits its own camera far worse than others.
     pub fits: Vec<Option<ViewFit>>,
 }
 
@@ -45,6 +47,12 @@ pub struct ViewPair {
     pub first: usize,
     /// By the other.
     pub second: usize,
+}
+
+/// Standard deviation per axis, px, of which the middle length of residual vectors comes: their squared
+/// length has the median 2 ln 2 times the variance.
+pub fn sigma_px(median_px: f64) -> f64 {
+    median_px / (2.0 * 2f64.ln()).sqrt()
 }
 
 impl<'a> Look<'a> {
@@ -96,6 +104,21 @@ impl<'a> Look<'a> {
             cameras,
             fits,
         }
+    }
+
+    /// What a pixel of a camera sees of a board in the middle of all, mm; `None` without a start.
+    pub fn mm_per_px(&self, camera_idx: usize) -> Option<f64> {
+        let field = &self.cameras[camera_idx].as_ref()?.field;
+        let middle = self.dataset.board.center_in_board();
+        let views = self.observations.views.iter().zip(&self.fits);
+        let distances = views
+            .filter(|(view, _)| view.camera_idx == camera_idx)
+            .filter_map(|(_, fit)| Some(fit.as_ref()?.camera_from_board.point(&middle).norm()));
+        let distance_mm = median(distances)?;
+        let center = field.sensor.center();
+        let next = PixelPoint::new(center.u + 1.0, center.v);
+        let [a, b] = [center, next].map(|pixel| field.ray(pixel).direction.normalize());
+        Some(a.cross(&b).norm() * distance_mm)
     }
 
     /// Number of a pose.

@@ -6,11 +6,14 @@
 //! [`reading`]; a camera's views are tried against another's in [`whole_camera`] and [`single_views`].
 
 mod agreement;
+mod corner_noise;
+mod coverage;
 mod design;
 mod duplicates;
 mod finding;
 mod geometry;
 mod handedness;
+mod image_size;
 mod look;
 mod measured;
 mod mirrored;

@@ -5,11 +5,10 @@
 use super::agreement::{ReadPair, agreement};
 use super::finding::Explained;
 use super::handedness::Hands;
-use super::look::Look;
+use super::look::{Look, ViewPair};
 use super::reading::Reading;
 use super::whole_camera::WholeCamera;
 use crate::cause::Code;
-use calib_estimate::adjust::observations::ViewBlock;
 use calib_estimate::init::board_pose::{ViewFit, fit_view};
 use calib_rays::board::BoardShape;
 use calib_rays::geometry::so3;
@@ -52,6 +51,7 @@ pub fn explain(look: &Look<'_>, hands: &Hands, whole: &WholeCamera) -> Vec<Expla
             readings[*k].misfit_px,
         ));
     }
+    found.extend(exchanged_misfits(look, whole));
     let bad: Vec<usize> = (0..readings.len()).filter(|k| !readings[*k].fits).collect();
     if bad.is_empty() {
         return found;
@@ -108,36 +108,26 @@ fn explanation(
     change: Change,
     misfit_px: f64,
 ) -> Explanation {
-    let second = (whole.camera_idx, whole.reference);
-    let ((camera_idx, other), code, reading) = match change {
-        Change::First(reading) => (
-            (whole.reference, whole.camera_idx),
-            reading.code(),
-            reading.to_string(),
-        ),
-        Change::Second(reading) => (second, reading.code(), reading.to_string()),
-        Change::Exchanged => (
-            second,
-            Code::CamerasExchanged,
-            format!(
-                "exchanged with that of camera {}",
-                look.name(whole.reference)
-            ),
-        ),
-        Change::OtherPose(steps) => (
-            second,
-            Code::PoseNumbering,
-            format!("as that of the pose {}", away(steps)),
-        ),
+    let pose = look.pose(whole.pairs[pair].pose_idx);
+    let labels = |camera_idx: usize, reading: Reading| Explained {
+        pose,
+        camera_idx,
+        code: reading.code(),
+        reading: reading.to_string(),
     };
-    debug_assert_ne!(camera_idx, other);
-    Explanation {
-        explained: Explained {
-            pose: look.pose(whole.pairs[pair].pose_idx),
-            camera_idx,
-            code,
-            reading,
+    let explained = match change {
+        Change::First(reading) => labels(whole.reference, reading),
+        Change::Second(reading) => labels(whole.camera_idx, reading),
+        Change::Exchanged => exchange(look, whole, pose),
+        Change::OtherPose(steps) => Explained {
+            pose,
+            camera_idx: whole.camera_idx,
+            code: Code::PoseNumbering,
+            reading: format!("as that of the pose {}", away(steps)),
         },
+    };
+    Explanation {
+        explained,
         misfit_px: [whole.agreed.readings[pair].misfit_px, misfit_px],
     }
 }
@@ -178,18 +168,7 @@ fn changed_pair(
             first: read.first.clone(),
             second: relabelled(views.second, &read.second, reading)?,
         }),
-        Change::Exchanged => {
-            let blocks = [views.first, views.second].map(|k| &look.observations.views[k]);
-            let through = |camera_idx: usize, block: &ViewBlock| {
-                let field = &look.cameras[camera_idx].as_ref()?.field;
-                fit_view(field, board, &BoardShape::default(), block)
-            };
-            let second = through(whole.camera_idx, blocks[0])?;
-            Some(ReadPair {
-                first: through(whole.reference, blocks[1])?,
-                second: whole.reading.of(board, &second),
-            })
-        }
+        Change::Exchanged => exchanged(look, whole, views),
         Change::OtherPose(steps) => {
             let pose = i64::try_from(look.pose(views.pose_idx)).ok()?;
             let mut others = look.observations.views.iter().zip(&look.fits);
@@ -202,6 +181,75 @@ fn changed_pair(
                 second: whole.reading.of(board, fit.as_ref()?),
             })
         }
+    }
+}
+
+/// Both views, each through the other's camera.
+fn exchanged(look: &Look<'_>, whole: &WholeCamera, views: ViewPair) -> Option<ReadPair> {
+    let board = &look.dataset.board;
+    let through = |camera_idx: usize, view: usize| {
+        let field = &look.cameras[camera_idx].as_ref()?.field;
+        let block = &look.observations.views[view];
+        fit_view(field, board, &BoardShape::default(), block)
+    };
+    let second = through(whole.camera_idx, views.first)?;
+    Some(ReadPair {
+        first: through(whole.reference, views.second)?,
+        second: whole.reading.of(board, &second),
+    })
+}
+
+/// Pairs with a view that does not even fit its own camera: it may be the other's.
+fn exchanged_misfits(look: &Look<'_>, whole: &WholeCamera) -> Vec<Explanation> {
+    let views = look.observations.views.iter().enumerate();
+    let of_camera = |camera_idx: usize| {
+        let views = views.clone();
+        views.filter(move |(_, view)| view.camera_idx == camera_idx)
+    };
+    let misfits: Vec<ViewPair> = of_camera(whole.camera_idx)
+        .filter_map(|(second, view)| {
+            let (first, _) =
+                of_camera(whole.reference).find(|(_, v)| v.pose_idx == view.pose_idx)?;
+            let is_misfit = look.fits[first].is_none() || look.fits[second].is_none();
+            is_misfit.then_some(ViewPair {
+                pose_idx: view.pose_idx,
+                first,
+                second,
+            })
+        })
+        .collect();
+    let mut read = whole.read.clone();
+    let mut poses = Vec::new();
+    for pair in misfits {
+        if let Some(pair_read) = exchanged(look, whole, pair) {
+            read.push(pair_read);
+            poses.push(look.pose(pair.pose_idx));
+        }
+    }
+    let Some(agreed) = agreement(look, &read).filter(|_| !poses.is_empty()) else {
+        return Vec::new();
+    };
+    let readings = &agreed.readings[whole.read.len()..];
+    poses
+        .into_iter()
+        .zip(readings)
+        .filter(|(_, reading)| reading.fits && !reading.is_turned)
+        .map(|(pose, reading)| Explanation {
+            explained: exchange(look, whole, pose),
+            misfit_px: [f64::INFINITY, reading.misfit_px],
+        })
+        .collect()
+}
+
+fn exchange(look: &Look<'_>, whole: &WholeCamera, pose: usize) -> Explained {
+    Explained {
+        pose,
+        camera_idx: whole.camera_idx,
+        code: Code::CamerasExchanged,
+        reading: format!(
+            "exchanged with that of camera {}",
+            look.name(whole.reference)
+        ),
     }
 }
 

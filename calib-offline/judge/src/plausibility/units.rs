@@ -96,14 +96,6 @@ pub fn units(look: &Look<'_>, cameras: &[WholeCamera]) -> Option<Cause> {
         .clone()
         .map(|(_, fit)| fit.camera_from_board.point(&middle).norm());
     let distance_mm = median(distances)?;
-    // A pixel's share of the board, from its size in the image: two sides of the middle's square.
-    let footprints = look.cameras.iter().filter_map(|camera| {
-        let field = &camera.as_ref()?.field;
-        let center = field.sensor.center();
-        let next = calib_rays::geometry::PixelPoint::new(center.u + 1.0, center.v);
-        let (a, b) = (field.ray(center).direction, field.ray(next).direction);
-        Some(a.cross(&b).norm() / (a.norm() * b.norm()) * distance_mm)
-    });
     let size = Size {
         width_mm: width.max(height) + board.square_mm,
         distance_mm,
@@ -111,18 +103,20 @@ pub fn units(look: &Look<'_>, cameras: &[WholeCamera]) -> Option<Cause> {
             .iter()
             .map(|whole| whole.agreed.second_from_first.translation_mm.norm())
             .min_by(f64::total_cmp),
-        footprint_mm: footprints.min_by(f64::total_cmp)?,
+        footprint_mm: (0..look.cameras.len())
+            .filter_map(|idx| look.mm_per_px(idx))
+            .min_by(f64::total_cmp)?,
     };
     let objection = size.objection()?;
-    let plausible: Vec<String> = UNITS
-        .iter()
-        .map(|(unit, factor)| (unit, size.scaled(*factor)))
-        .filter(|(_, size)| size.objection().is_none())
-        .map(|(unit, size)| format!("in {unit} it is {}", size.words()))
-        .collect();
+    // Squares are made in whole or half millimeters.
+    let roundness = |factor: f64| {
+        let halves = 2.0 * factor * board.square_mm;
+        (halves - halves.round()).abs() / halves
+    };
     let most_likely = UNITS
         .iter()
-        .find(|(_, factor)| size.scaled(*factor).objection().is_none());
+        .filter(|(_, factor)| size.scaled(*factor).objection().is_none())
+        .min_by(|a, b| roundness(a.1).total_cmp(&roundness(b.1)));
     let cost_mm = most_likely.and_then(|(_, factor)| {
         let extent_mm = extent_mm(look, 0)?;
         Some((factor - 1.0) * extent_mm)
@@ -132,11 +126,9 @@ pub fn units(look: &Look<'_>, cameras: &[WholeCamera]) -> Option<Cause> {
          that is known to be so small: [board.certificate] says so)",
         board.square_mm,
         size.words(),
-        if plausible.is_empty() {
-            String::new()
-        } else {
-            format!("; {}", plausible.join("; "))
-        }
+        most_likely.map_or(String::new(), |(unit, factor)| {
+            format!("; in {unit} it is {}", size.scaled(*factor).words())
+        })
     );
     let size = most_likely.map_or_else(
         || format!("{} mm", digits(board.square_mm)),
