@@ -22,7 +22,7 @@ impl Error {
         };
         let text = self
             .source()
-            .map_or_else(|| self.to_string(), |e| e.to_string());
+            .map_or_else(|| self.to_string(), ToString::to_string);
         code.into_iter()
             .map(|code| Cause {
                 code,

@@ -8,10 +8,11 @@ use calib_rays::field::{CoverageMask, RayField, transport};
 use calib_rays::geometry::PixelPoint;
 use nalgebra::Vector2;
 
-/// Share below which most of what is seen gets no answer.
-const MOST: f64 = 0.5;
+/// Share below which the boards were shown in a part of the image only: a board kept to the middle half of
+/// the width and of the height covers a quarter, one that is led to the edges well over a third.
+const PART: f64 = 1.0 / 3.0;
 
-/// Cameras of which less than half of what they can show is covered.
+/// Cameras of which less than a third of what they can show is covered.
 pub fn coverage(look: &Look<'_>) -> Vec<Cause> {
     let views = &look.observations.views;
     let cameras = look.cameras.iter().enumerate();
@@ -23,7 +24,7 @@ pub fn coverage(look: &Look<'_>) -> Vec<Cause> {
             let mask = CoverageMask::from_corners(sensor, pixels);
             let shown = camera.as_ref().map_or(1.0, |camera| shown_share(&camera.field));
             let share = mask.covered_share() / shown;
-            (share < MOST && mask.covered_share() > 0.0).then(|| {
+            (share < PART && mask.covered_share() > 0.0).then(|| {
                 let of = if shown < 1.0 {
                     format!(
                         "what camera {} can show (a circle, {:.0} % of its sensor)",

@@ -1,5 +1,5 @@
 //! How well a recording's boards hold a lens, before any fit: the covariance of a lens of nine numbers
-//! (focal lengths, principal point, three radial and two tangential terms, as OpenCV's), of the
+//! (focal lengths, principal point, three radial and two tangential terms, as `OpenCV` has them), of the
 //! cameras' places and of the boards' poses, from where the boards stand and what was seen of them; and
 //! what it does to measured points.
 //!
@@ -10,6 +10,7 @@
 use calib_estimate::adjust::residual::{Linearization, linearize};
 use calib_rays::field::RayField;
 use calib_rays::geometry::{PixelPoint, RigidTransform, so3};
+use calib_rays::numerics::SingularValues;
 use calib_rays::numerics::arrowhead::{Arrowhead, PoseBlock};
 use nalgebra::{
     DMatrix, Matrix2x3, Matrix2x6, Matrix2xX, Matrix3, Matrix3xX, Matrix6, Vector2, Vector3,
@@ -23,6 +24,8 @@ const PLACE: usize = 6;
 /// What a lens may be off by before anything is seen, as a share of half the sensor: wide enough to
 /// say nothing, so that what the boards do not determine stays a number.
 const PRIOR_SHARE: f64 = 0.2;
+/// A singular value this much smaller than the largest is that of a single ray along itself.
+const DEPENDENT: f64 = 1e-9;
 
 /// A camera and where it stands; the first one's frame is the rig's.
 #[derive(Debug, Clone, Copy)]
@@ -153,9 +156,10 @@ impl<'a> Design<'a> {
         if count < 4 {
             return None;
         }
-        let (moves, placement) = (moves.rows(0, 3 * count), placement.rows(0, 3 * count));
-        let basis = placement.into_owned().qr().q();
-        let left = &moves - &basis * (basis.tr_mul(&moves));
+        let moves = moves.rows(0, 3 * count).into_owned();
+        let placement = placement.rows(0, 3 * count).into_owned();
+        let basis = placement.qr().q();
+        let left = &moves - &basis * basis.tr_mul(&moves);
         let variance = (&left * covariance).component_mul(&left).sum() / count as f64;
         variance.is_finite().then(|| variance.max(0.0).sqrt())
     }
@@ -178,7 +182,7 @@ impl<'a> Design<'a> {
             return None;
         }
         // One ray leaves the point free along itself: no movement there.
-        let inverse = information.pseudo_inverse(1e-9 * information.norm()).ok()?;
+        let inverse = SingularValues::new(information)?.pseudo_inverse(DEPENDENT);
         let columns: Vec<usize> = pulls.iter().flat_map(|(_, c)| c.clone()).collect();
         let mut rows = DMatrix::zeros(3, columns.len());
         let mut at = 0;

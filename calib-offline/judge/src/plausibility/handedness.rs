@@ -2,6 +2,7 @@
 //! and rows down, and so they turn as u and v do; labels or pixels that are mirrored turn the other way.
 
 use super::look::Look;
+use calib_estimate::adjust::observations::ObservedCorner;
 use calib_recording::dataset::ExpectedOptics;
 use calib_recording::detect::turning::turns_like_image;
 
@@ -24,7 +25,7 @@ impl Hands {
         let of_view: Vec<Option<bool>> = views
             .iter()
             .map(|view| {
-                let corners: Vec<_> = view.corners.iter().map(|c| c.labelled()).collect();
+                let corners: Vec<_> = view.corners.iter().map(ObservedCorner::labelled).collect();
                 Some(turns_like_image(&corners)? != in_mirror(view.camera_idx))
             })
             .collect();

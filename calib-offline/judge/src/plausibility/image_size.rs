@@ -7,12 +7,16 @@ use super::look::{Look, sigma_px};
 use crate::cause::{Cause, Code};
 use crate::verdict::Grade;
 use calib_estimate::adjust::Observations;
+use calib_estimate::init::board_pose::fit_view;
 use calib_estimate::init::focal_scan::start_camera;
+use calib_rays::board::BoardShape;
 
 /// Scales that resizing and binning give.
 const SCALES: [f64; 5] = [0.25, 1.0 / 3.0, 0.5, 2.0 / 3.0, 0.75];
 /// Fewer views of a kind show nothing.
 const LEAST: usize = 2;
+/// So many views that fit into the small image by chance are looked behind.
+const CHANCE: usize = 4;
 /// Scaled up, corners must fit the lens better by this factor.
 const CLEAR: f64 = 3.0;
 
@@ -99,41 +103,54 @@ fn of_camera(look: &Look<'_>, camera_idx: usize) -> Option<Small> {
             if small < LEAST || count - small < LEAST {
                 continue;
             }
-            let change = if is_later { count - small } else { small };
-            // Views next to the change may be large ones that happen to fit; two more places are tried.
-            for nearer in 0..=2 {
-                let change = if is_later {
-                    change + nearer
-                } else {
-                    change.saturating_sub(nearer)
-                };
-                if change < LEAST || count - change < LEAST {
-                    continue;
-                }
-                let mut scaled: Observations = own.clone();
-                for (k, view) in scaled.views.iter_mut().enumerate() {
-                    if (k >= change) == is_later {
-                        for corner in &mut view.corners {
-                            corner.pixel.u = (corner.pixel.u + 0.5) / scale - 0.5;
-                            corner.pixel.v = (corner.pixel.v + 0.5) / scale - 0.5;
-                        }
-                    }
-                }
-                let Ok(start) = start_camera(&scaled, camera_idx) else {
-                    continue;
-                };
+            // Views next to the change may be large ones that fit into the small image by chance.
+            let begun = (0..=CHANCE).find_map(|chance| {
+                let small = small.checked_sub(chance).filter(|small| *small >= LEAST)?;
+                let change = if is_later { count - small } else { small };
+                let scaled = rescaled(&own, scale, |k| (k >= change) == is_later);
+                let start = start_camera(&scaled, camera_idx).ok()?;
                 let sigma = sigma_px(start.median_px);
-                if as_recorded.is_none_or(|before| CLEAR * sigma < before) {
-                    let pose_idx = own.views[change].pose_idx;
-                    return Some(Small {
-                        cameras: vec![look.name(camera_idx).to_owned()],
-                        scale,
-                        since_pose: own.poses[pose_idx],
-                        is_later,
-                    });
-                }
-            }
+                as_recorded
+                    .is_none_or(|before| CLEAR * sigma < before)
+                    .then_some(start)
+            });
+            let Some(start) = begun else { continue };
+            let is_small = |k: usize, change: usize| (k >= change) == is_later;
+            // Which views are small, the lens tells.
+            let all = rescaled(&own, scale, |_| true);
+            let misfits = |views: &Observations| -> Vec<f64> {
+                let misfit = |view| {
+                    fit_view(&start.field, &own.board, &BoardShape::default(), view)
+                        .map_or(f64::INFINITY, |fit| fit.median_px)
+                };
+                views.views.iter().map(misfit).collect()
+            };
+            let (large, small) = (misfits(&own), misfits(&all));
+            let misread = |change: &usize| {
+                let wrong = |k: &usize| is_small(*k, *change) != (small[*k] < large[*k]);
+                (0..count).filter(wrong).count()
+            };
+            let change = (1..count).min_by_key(misread)?;
+            let pose_idx = own.views[change].pose_idx;
+            return Some(Small {
+                cameras: vec![look.name(camera_idx).to_owned()],
+                scale,
+                since_pose: own.poses[pose_idx],
+                is_later,
+            });
         }
     }
     None
+}
+
+/// The observations with the pixels of some views counted on an image of full size.
+fn rescaled(own: &Observations, scale: f64, is_small: impl Fn(usize) -> bool) -> Observations {
+    let mut scaled = own.clone();
+    for (k, view) in scaled.views.iter_mut().enumerate() {
+        for corner in view.corners.iter_mut().filter(|_| is_small(k)) {
+            corner.pixel.u = (corner.pixel.u + 0.5) / scale - 0.5;
+            corner.pixel.v = (corner.pixel.v + 0.5) / scale - 0.5;
+        }
+    }
+    scaled
 }

@@ -83,7 +83,9 @@ impl Sheet {
         }
         sheet.causes.extend(units::units(&look, &cameras));
         // What copies leave to be few follows from them.
-        causes.iter_mut().for_each(|cause| cause.cost_mm = error_mm);
+        for cause in &mut causes {
+            cause.cost_mm = error_mm;
+        }
         sheet.causes.extend(causes);
         let error_mm_per_px = geometry.as_ref().map(|found| found.error_mm_per_px);
         let noise = corner_noise::noise_and_outliers(&look, error_mm_per_px);

@@ -14,6 +14,8 @@ use calib_rays::board::BoardShape;
 use calib_rays::geometry::so3;
 use rayon::prelude::*;
 
+/// Another reading is believed if the pair then fits better by this factor, px.
+const CLEAR: f64 = 3.0;
 /// A view is tried as that of a pose as many numbers away.
 const MOST_STEPS: i64 = 2;
 
@@ -83,7 +85,9 @@ pub fn explain(look: &Look<'_>, hands: &Hands, whole: &WholeCamera) -> Vec<Expla
                 .into_iter()
                 .filter_map(|k| {
                     let reading = agreed.as_ref()?.readings[k];
-                    (reading.fits && !reading.is_turned).then_some((k, reading.misfit_px))
+                    let is_clear = CLEAR * reading.misfit_px < readings[k].misfit_px;
+                    (reading.fits && !reading.is_turned && is_clear)
+                        .then_some((k, reading.misfit_px))
                 })
                 .collect();
             (change, fitting)

@@ -107,7 +107,9 @@ const RIGHT: usize = 1;
 
 fn change(views: &mut [View], which: impl Fn(&View) -> bool, change: impl Fn(&mut Corner)) {
     for view in views.iter_mut().filter(|view| which(view)) {
-        view.corners.iter_mut().for_each(&change);
+        for corner in &mut view.corners {
+            change(corner);
+        }
         view.corners.sort_by_key(|c| (c.row, c.col));
     }
 }
@@ -159,9 +161,9 @@ fn units_that_are_no_millimeters() {
 fn cameras_exchanged_throughout_and_in_some_poses() {
     let (dataset, mut views) = brown();
     let faultless = views.clone();
-    views
-        .iter_mut()
-        .for_each(|view| view.camera_idx = 1 - view.camera_idx);
+    for view in &mut views {
+        view.camera_idx = 1 - view.camera_idx;
+    }
     views.sort_by_key(|view| (view.pose, view.camera_idx));
     let (code, text) = only_cause(&dataset, &views);
     assert_eq!(code, Code::CamerasExchanged, "{text}");
@@ -221,7 +223,9 @@ fn labels_mirrored_in_some_views() {
 fn shift(views: &mut [View], rows: usize, which: impl Fn(&View) -> bool) {
     for view in views.iter_mut().filter(|view| which(view)) {
         view.corners.retain(|c| c.row + 1 < rows);
-        view.corners.iter_mut().for_each(|c| c.row += 1);
+        for corner in &mut view.corners {
+            corner.row += 1;
+        }
     }
 }
 
@@ -326,8 +330,9 @@ fn noise_and_wrong_corners() {
     assert_eq!(lowering(&dataset, &views), [Code::Outliers; 2]);
     let mut views = few;
     for (k, corner) in views.iter_mut().flat_map(|v| &mut v.corners).enumerate() {
-        // Spread like noise, and far from smooth.
-        corner.pixel.v += (7.0 * k as f64).sin() + (13.7 * k as f64).sin();
+        // Even between -1 and 1, in no order.
+        corner.pixel.v += (31 * k * k % 101) as f64 / 50.0 - 1.0;
+        corner.pixel.u += (47 * k * k % 103) as f64 / 51.0 - 1.0;
     }
     assert_eq!(lowering(&dataset, &views), [Code::Noise; 2]);
 }

@@ -22,6 +22,7 @@ const MOST_WIDTH_MM: f64 = 20_000.0;
 const UNITS: [(&str, f64); 3] = [("centimeters", 10.0), ("inches", 25.4), ("meters", 1000.0)];
 
 /// What the rig would be if squares are as long as the manifest says.
+#[allow(clippy::struct_field_names, reason = "the unit is part of the name")]
 struct Size {
     width_mm: f64,
     distance_mm: f64,

@@ -15,6 +15,11 @@ use rayon::prelude::*;
 const SUSPICIOUS: f64 = 9.0;
 /// Another reading is believed if the middle pair then fits better by this factor (variance): 3 in px.
 const CLEAR: f64 = 9.0;
+/// Poses out of step must fit better by more, 10 in px: on a stage that turns by equal steps all pairs of
+/// one placement agree on some other place of the cameras.
+const CLEAR_STEPS: f64 = 100.0;
+/// And so many of the pairs must be left.
+const LEFT_SHARE: f64 = 0.75;
 /// Readings that fit the same to within this factor (variance) are told apart by what is more usual.
 const SAME: f64 = 2.0;
 /// Poses are tried out of step by as many.
@@ -85,16 +90,19 @@ pub fn read_camera(
         .filter(|steps| *steps != 0)
         .map(|steps| (Reading::AsRecorded, steps));
     let candidates: Vec<(Reading, i64)> = readings.chain(out_of_step).collect();
-    // Fewer pairs fit more easily.
-    let enough = |found: &WholeCamera| 2 * found.pairs.len() > plain.pairs.len();
+    let variance = |found: &WholeCamera| found.agreed.variance_px2;
+    let is_clear = |found: &WholeCamera| {
+        let factor = if found.steps == 0 { CLEAR } else { CLEAR_STEPS };
+        let left = found.pairs.len() as f64 >= LEFT_SHARE * plain.pairs.len() as f64;
+        left && factor * variance(found) < variance(&plain)
+    };
     let tried: Vec<WholeCamera> = candidates
         .into_par_iter()
         .filter_map(|(reading, steps)| attempt(reading, steps))
-        .filter(enough)
+        .filter(is_clear)
         .collect();
-    let variance = |found: &WholeCamera| found.agreed.variance_px2;
     let least = tried.iter().map(variance).fold(f64::INFINITY, f64::min);
-    if !(CLEAR * least < plain.agreed.variance_px2) {
+    if tried.is_empty() {
         return Some(plain);
     }
     let as_recorded_px = plain.agreed.typical_px;

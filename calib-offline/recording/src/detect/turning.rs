@@ -38,7 +38,9 @@ mod tests {
         };
         let mut corners: Vec<Corner> = (0..9).map(corner).collect();
         assert_eq!(turns_like_image(&corners), Some(true));
-        corners.iter_mut().for_each(|c| c.pixel.v *= -1.0);
+        for corner in &mut corners {
+            corner.pixel.v *= -1.0;
+        }
         assert_eq!(turns_like_image(&corners), Some(false));
         assert_eq!(turns_like_image(&corners[..3]), None);
     }
