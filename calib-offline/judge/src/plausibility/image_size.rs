@@ -16,7 +16,7 @@ const SCALES: [f64; 5] = [0.25, 1.0 / 3.0, 0.5, 2.0 / 3.0, 0.75];
 /// Fewer views of a kind show nothing.
 const LEAST: usize = 2;
 /// So many views that fit into the small image by chance are looked behind.
-const CHANCE: usize = 4;
+const CHANCE: usize = 8;
 /// Scaled up, corners must fit the lens better by this factor.
 const CLEAR: f64 = 3.0;
 
