@@ -99,6 +99,19 @@ impl Sheet {
         sheet
     }
 
+    /// The causes of the sheet with those that a fit shows, most likely first: what both name, as the sheet has
+    /// it, and no late exposure of views that another reading explains.
+    pub fn with_suspects(&self, mut suspects: Vec<Cause>) -> Vec<Cause> {
+        suspects.retain(|suspect| {
+            let is_known = self.causes.iter().any(|cause| cause.code == suspect.code);
+            let is_explained = suspect.code == Code::NotSimultaneous && !self.explained.is_empty();
+            !is_known && !is_explained
+        });
+        suspects.extend(self.causes.iter().cloned());
+        sort(&mut suspects);
+        suspects
+    }
+
     /// Holds the dial against boards that are what they claim.
     fn turn_dial(&mut self, look: &Look<'_>, views: &[View], placed: &Placed, same_as: &[usize]) {
         let all = poses(views);
