@@ -42,7 +42,15 @@ pub fn image_size(look: &Look<'_>) -> Option<Cause> {
             }
         }
     }
-    let small = found?;
+    let mut small = found?;
+    // The other cameras changed with it if their pixels since then fit into the small image too.
+    small.cameras = (0..look.dataset.cameras.len())
+        .filter(|idx| {
+            let is_found = small.cameras.iter().any(|name| name == look.name(*idx));
+            is_found || changed_too(look, *idx, &small)
+        })
+        .map(|idx| look.name(idx).to_owned())
+        .collect();
     let words = |is_small: bool| if is_small { "smaller" } else { "larger" };
     Some(Cause {
         since_pose: Some(small.since_pose),
@@ -72,6 +80,23 @@ pub fn image_size(look: &Look<'_>) -> Option<Cause> {
                 },
             ),
         )
+    })
+}
+
+fn changed_too(look: &Look<'_>, camera_idx: usize, small: &Small) -> bool {
+    let sensor = look.dataset.cameras[camera_idx].sensor;
+    let (width, height) = (
+        small.scale * f64::from(sensor.width),
+        small.scale * f64::from(sensor.height),
+    );
+    let own = look.observations.views.iter();
+    let mut own = own.filter(|view| {
+        let is_later = look.pose(view.pose_idx) >= small.since_pose;
+        view.camera_idx == camera_idx && is_later == small.is_later
+    });
+    own.all(|view| {
+        let mut corners = view.corners.iter();
+        corners.all(|c| c.pixel.u < width && c.pixel.v < height)
     })
 }
 
