@@ -22,6 +22,7 @@ use calib_judge::agreement::{Whole, agreement};
 use calib_judge::half_data::splits;
 use calib_judge::held_out::folds_wanted;
 use calib_judge::plausibility::Sheet;
+use calib_judge::unexpected_optics::unexpected_optics;
 use calib_judge::verdict::Thresholds;
 use calib_judge::{Folds, held_out};
 use calib_rays::field::RayTable;
@@ -171,7 +172,9 @@ pub fn calibrate_corners(
     );
     progress.end();
     let sheet = Sheet::of(dataset, &views);
-    let causes = sheet.with_suspects(causes);
+    let mut causes = sheet.with_suspects(causes);
+    let central = checks.as_ref().map(|checks| &checks.central_model);
+    causes.extend(central.and_then(|c| unexpected_optics(dataset, &solution.rig, c)));
     let whole = Whole {
         rig: &solution.rig,
         board_shape: &solution.board_shape,

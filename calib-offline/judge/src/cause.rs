@@ -91,6 +91,24 @@ pub enum Code {
 }
 
 impl Code {
+    /// Whether data were taken for others than they are: no fit of them means anything.
+    pub const fn is_misread(self) -> bool {
+        matches!(
+            self,
+            Self::SquareUnit
+                | Self::RowsColsSwapped
+                | Self::LabelsTurned
+                | Self::LabelsMirrored
+                | Self::LabelsShifted
+                | Self::CamerasExchanged
+                | Self::VUpwards
+                | Self::UvExchanged
+                | Self::ImageSize
+                | Self::Duplicates
+                | Self::PoseNumbering
+        )
+    }
+
     /// Its name in files.
     pub fn word(self) -> String {
         serde_json::to_value(self)

@@ -16,6 +16,7 @@ pub mod plausibility;
 pub mod stage_axis;
 mod suspect_words;
 pub mod suspects;
+pub mod unexpected_optics;
 pub mod verdict;
 pub mod working_volume;
 

@@ -35,9 +35,8 @@ pub struct Thresholds {
     /// Share of views that had to be left out, split from their pair or renumbered; above it,
     /// something is wrong with how the recording is made.
     pub suspect_views: f64,
-    /// Poses used; below the first is doubtful (few views hold no flexible field), below the
-    /// second is a fail.
-    pub poses: (usize, usize),
+    /// Fewer poses are a fail. How many a recording needs beyond follows from its geometry (`few-poses`).
+    pub poses: usize,
 }
 
 impl Default for Thresholds {
@@ -49,7 +48,7 @@ impl Default for Thresholds {
             disagreement: 2.0,
             rejected_share: 0.3,
             suspect_views: 0.1,
-            poses: (10, 3),
+            poses: 3,
         }
     }
 }
@@ -124,16 +123,15 @@ pub fn judge(figures: &Figures, thresholds: &Thresholds) -> Verdict {
             ),
         ));
     }
-    let (few, too_few) = thresholds.poses;
-    let grade = match figures.pose_count {
-        n if n < too_few => Grade::Fail,
-        n if n < few => Grade::Doubtful,
-        _ => Grade::Pass,
-    };
-    reasons.push((
-        grade,
-        format!("{} poses, {few} or more wanted", figures.pose_count),
-    ));
+    if figures.pose_count < thresholds.poses {
+        reasons.push((
+            Grade::Fail,
+            format!(
+                "{} poses, {} or more needed",
+                figures.pose_count, thresholds.poses
+            ),
+        ));
+    }
     if !figures.settled {
         reasons.push((
             Grade::Doubtful,
@@ -284,13 +282,13 @@ fn rejected(figures: &Figures, thresholds: &Thresholds) -> Reason {
 mod tests {
     use super::*;
 
-    fn ratio(ratio: f64) -> Option<Ratio> {
-        Some(Ratio {
+    fn ratio(ratio: f64) -> Ratio {
+        Ratio {
             rms_px: 0.07 * ratio,
             beside_px: 0.07,
             ratio,
             by_chance: [1.0, 1.04],
-        })
+        }
     }
 
     fn good() -> Figures {
@@ -298,9 +296,9 @@ mod tests {
             sigma_px: 0.05,
             all_sigma_px: 0.06,
             agreement: Some(Agreement {
-                mono: ratio(1.02),
-                stereo: ratio(1.02),
-                cameras: ratio(1.02),
+                mono: Some(ratio(1.02)),
+                stereo: Some(ratio(1.02)),
+                cameras: Some(ratio(1.02)),
                 disagreement_px: 0.0,
             }),
             mm_per_px: 0.3,
@@ -340,17 +338,25 @@ mod tests {
             (|f| f.sigma_px = f64::NAN, Grade::Fail),
             (|f| f.agreement = None, Grade::Doubtful),
             (
-                |f| f.agreement.iter_mut().for_each(|a| a.mono = ratio(6.0)),
+                |f| {
+                    f.agreement
+                        .iter_mut()
+                        .for_each(|a| a.mono = Some(ratio(6.0)));
+                },
                 Grade::Fail,
             ),
             (
-                |f| f.agreement.iter_mut().for_each(|a| a.stereo = ratio(0.9)),
+                |f| {
+                    f.agreement
+                        .iter_mut()
+                        .for_each(|a| a.stereo = Some(ratio(0.9)));
+                },
                 Grade::Doubtful,
             ),
             (
                 |f| {
                     f.agreement.iter_mut().for_each(|a| {
-                        a.cameras = ratio(1.5);
+                        a.cameras = Some(ratio(1.5));
                         a.disagreement_px = 0.08;
                     });
                 },
@@ -359,7 +365,7 @@ mod tests {
             (|f| f.neighbors_mm = Some((0.03, 0.02)), Grade::Doubtful),
             (|f| f.corners = (500, 500), Grade::Fail),
             (|f| f.all_sigma_px = 0.5, Grade::Doubtful),
-            (|f| f.pose_count = 5, Grade::Doubtful),
+            (|f| f.pose_count = 2, Grade::Fail),
         ];
         for (spoil, expected) in cases {
             let mut figures = good();

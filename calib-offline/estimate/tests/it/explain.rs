@@ -8,7 +8,7 @@ use calib_simulate::faults::{Poses, Rig, named, plant};
 
 /// What explains the recording with a fault.
 fn found(fault: &str, rig: Rig, poses: Poses, seed: u64) -> Vec<Explanation> {
-    let recording = plant(&named(fault).unwrap(), rig, poses, seed).unwrap();
+    let recording = plant(named(fault).unwrap(), rig, poses, seed).unwrap();
     let observations = Observations::new(recording.board, recording.sensors, &recording.views);
     let start = start_rig(&observations).unwrap();
     let (estimate, _) = estimate_screened(&observations, start).unwrap();

@@ -100,16 +100,21 @@ impl Sheet {
     }
 
     /// The causes of the sheet with those that a fit shows, most likely first: what both name, as the sheet has
-    /// it, and no late exposure of views that another reading explains.
+    /// it, and no late exposure of views that another reading explains. What was written down wrongly goes
+    /// first: a fit of such data shows anything.
     pub fn with_suspects(&self, mut suspects: Vec<Cause>) -> Vec<Cause> {
         suspects.retain(|suspect| {
             let is_known = self.causes.iter().any(|cause| cause.code == suspect.code);
             let is_explained = suspect.code == Code::NotSimultaneous && !self.explained.is_empty();
             !is_known && !is_explained
         });
-        suspects.extend(self.causes.iter().cloned());
+        let is_misread = |cause: &Cause| cause.grade > Grade::Pass && cause.code.is_misread();
+        let causes = self.causes.iter().cloned();
+        let (mut first, others): (Vec<Cause>, Vec<Cause>) = causes.partition(is_misread);
+        suspects.extend(others);
         sort(&mut suspects);
-        suspects
+        first.extend(suspects);
+        first
     }
 
     /// Holds the dial against boards that are what they claim.
