@@ -18,9 +18,11 @@ mod suspect_words;
 pub mod suspects;
 pub mod unexpected_optics;
 pub mod verdict;
+pub mod what_next;
 pub mod working_volume;
 
 pub use cause::{Cause, Code};
 pub use cross_checks::{CrossChecks, cross_check};
 pub use held_out::{Folds, HeldOut, estimate_folds, held_out};
 pub use stage_axis::fit_stage_axes;
+pub use what_next::what_to_record_next;

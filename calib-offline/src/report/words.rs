@@ -6,7 +6,7 @@ use calib_estimate::joint::{Alternative, Choice, Family};
 use calib_judge::central_model::CentralModel;
 use calib_judge::centrality::Centrality;
 use calib_judge::half_data::{HalfData, HalfDataCheck, Skipped};
-use calib_rays::field::structured::OFFSET_CORE_DEGREE;
+use calib_rays::field::structured::{OFFSET_CORE_DEGREE, PLAIN_DEGREE, TILT_DEGREE};
 
 /// How many numbers of a kind there are, and how many of them the data determine.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -171,6 +171,13 @@ pub fn alternative(choice: &Choice, calibration: &Calibration) -> String {
             format!("{} central", camera.map_or("camera", |c| c.name.as_str()))
         }
         Alternative::NoSpline => "no spline".to_owned(),
+        Alternative::Plain { degree: None } => "plain lenses".to_owned(),
+        Alternative::Plain {
+            degree: Some(TILT_DEGREE),
+        } => "lenses without skew and tilt".to_owned(),
+        Alternative::Plain {
+            degree: Some(degree),
+        } => format!("directions without degree {degree}"),
     }
 }
 
@@ -185,6 +192,8 @@ pub fn gain(choice: &Choice) -> String {
 /// A family of numbers.
 pub fn family(family: Family) -> String {
     match family {
+        Family::Direction(PLAIN_DEGREE) => "direction, aspect and decentering".to_owned(),
+        Family::Direction(TILT_DEGREE) => "direction, skew and tilt".to_owned(),
         Family::Direction(degree) => format!("direction, degree {degree}"),
         Family::Spline => "direction, spline".to_owned(),
         Family::Offset(OFFSET_CORE_DEGREE) => format!("offset, up to degree {OFFSET_CORE_DEGREE}"),

@@ -20,3 +20,6 @@ mod schemas;
 mod starting_points;
 mod target_command;
 mod uncertainty;
+#[path = "../../benches/common/weak_rigs.rs"]
+mod weak_rigs;
+mod what_next;

@@ -6,6 +6,7 @@ use super::objective::{Weights, cost};
 use super::observations::{Observations, ViewBasis};
 use super::priors::Priors;
 use calib_rays::numerics::levenberg::{self, Problem, StopReason, Tried};
+use std::cell::Cell;
 
 /// When to stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,6 +43,11 @@ impl Settings {
     }
 }
 
+/// Steps that correct another, at most.
+const MOST_CORRECTIONS: usize = 3;
+/// Of the steps that correct another: what is determined a hundred times worse than by itself stays.
+const CORRECTION_DAMPING: f64 = 1e-4;
+
 /// The state reached, and how.
 #[derive(Debug, Clone)]
 pub struct Outcome {
@@ -60,6 +66,53 @@ struct Adjustment<'a> {
     weights: &'a Weights,
     priors: &'a Priors,
     relative_decrease: f64,
+    /// Cost where the search last linearized.
+    at: Cell<f64>,
+}
+
+impl Adjustment<'_> {
+    /// Where a step leads, brought back to the floor of a curved valley.
+    ///
+    /// Boards that hardly tilt leave a valley that is long, flat and curved: focal lengths and the
+    /// boards' distances grow together, one additively in the field, the others in mm. A step along
+    /// it that is right to first order climbs the wall; the directions that the data determine well
+    /// take that back in a step or two of their own, the others held by the damping. Without that
+    /// only steps too short to climb would be taken, and their number runs out (METHOD 2.5).
+    fn corrected(&self, stepped: Model) -> Model {
+        let limit = self.at.get();
+        let mut reached = (self.cost(&stepped), stepped);
+        for _ in 0..MOST_CORRECTIONS {
+            if reached.0 < limit {
+                break;
+            }
+            let Some(next) = self.strong_step(&reached.1) else {
+                break;
+            };
+            let cost = self.cost(&next);
+            if !(cost < reached.0) {
+                break;
+            }
+            reached = (cost, next);
+        }
+        reached.1
+    }
+
+    fn strong_step(&self, from: &Model) -> Option<Model> {
+        let equations = self.assembled(from);
+        let step = equations.step(&equations.reduce(CORRECTION_DAMPING)?);
+        Some(from.stepped(&self.layout, &step))
+    }
+
+    fn assembled(&self, model: &Model) -> NormalEquations {
+        NormalEquations::assemble(
+            model,
+            &self.layout,
+            self.observations,
+            self.bases,
+            self.weights,
+            self.priors,
+        )
+    }
 }
 
 impl Problem for Adjustment<'_> {
@@ -78,14 +131,8 @@ impl Problem for Adjustment<'_> {
     }
 
     fn linearize(&self, model: &Model) -> Option<NormalEquations> {
-        Some(NormalEquations::assemble(
-            model,
-            &self.layout,
-            self.observations,
-            self.bases,
-            self.weights,
-            self.priors,
-        ))
+        self.at.set(self.cost(model));
+        Some(self.assembled(model))
     }
 
     fn step(&self, equations: &NormalEquations, damping: f64) -> Option<Step> {
@@ -93,7 +140,7 @@ impl Problem for Adjustment<'_> {
     }
 
     fn moved(&self, model: &Model, step: &Step) -> Option<Model> {
-        Some(model.stepped(&self.layout, step))
+        Some(self.corrected(model.stepped(&self.layout, step)))
     }
 
     fn is_settled(&self, tried: &Tried<Self>) -> bool {
@@ -120,6 +167,7 @@ pub fn minimize(
         weights,
         priors,
         relative_decrease: settings.relative_decrease,
+        at: Cell::new(f64::INFINITY),
     };
     let outcome = levenberg::minimize(&adjustment, start, &settings.of_search());
     let mut model = outcome.state;

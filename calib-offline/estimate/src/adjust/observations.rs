@@ -11,6 +11,9 @@ use calib_rays::observed::{Corner, View};
 use nalgebra::{DMatrix, Matrix2, Vector2, Vector3};
 use std::sync::Arc;
 
+/// Corners that are predicted farther away are outliers and keep their place.
+const FARTHEST_ANCHOR_PX: f64 = 3.0;
+
 /// All views offered to an adjustment.
 #[derive(Debug, Clone)]
 pub struct Observations {
@@ -48,6 +51,8 @@ pub struct ObservedCorner {
     pub point_in_board: Vector3<f64>,
     /// Where it was seen.
     pub pixel: PixelPoint,
+    /// Where it was seen from the pixel at which its residual is taken, px: zero at first.
+    pub beyond_px: Vector2<f64>,
     /// Inverse variance relative to the typical corner of the dataset.
     pub relative_weight: f64,
 }
@@ -85,6 +90,7 @@ impl Observations {
                         col: corner.col,
                         point_in_board: board.corner_in_board(corner.row, corner.col),
                         pixel: corner.pixel,
+                        beyond_px: Vector2::zeros(),
                         relative_weight: corner
                             .sigma_px
                             .map_or(1.0, |sigma_px| (typical_sigma_px / sigma_px).powi(2)),
@@ -104,6 +110,24 @@ impl Observations {
             poses,
             views: blocks,
         }
+    }
+
+    /// The same with residuals taken where a model sees the corners: at the observed pixels without
+    /// its `residuals` (observed minus predicted, px). There the derivative that a residual leaves
+    /// out is multiplied by nothing (METHOD 2.2).
+    pub fn anchored(&self, residuals: &[Vec<Option<Vector2<f64>>>]) -> Self {
+        let mut anchored = self.clone();
+        for (view, residuals) in anchored.views.iter_mut().zip(residuals) {
+            for (corner, residual) in view.corners.iter_mut().zip(residuals) {
+                // An outlier's prediction may be anywhere.
+                let near = residual.filter(|r| r.norm() < FARTHEST_ANCHOR_PX);
+                let to = near.unwrap_or_default();
+                let seen = Vector2::new(corner.pixel.u, corner.pixel.v) + corner.beyond_px;
+                corner.pixel = PixelPoint::new(seen.x - to.x, seen.y - to.y);
+                corner.beyond_px = to;
+            }
+        }
+        anchored
     }
 
     /// Number of different poses; one that was split counts once.

@@ -31,8 +31,12 @@ pub fn predict<'a>(
         let turned_in_rig =
             camera.camera_from_rig.rotation * (turned_in_board + pose.translation_mm);
         let point_in_camera = turned_in_rig + camera.camera_from_rig.translation_mm;
+        let linearization = linearize(&basis.sample(&camera.field, idx), &point_in_camera);
         Seen {
-            linearization: linearize(&basis.sample(&camera.field, idx), &point_in_camera),
+            linearization: linearization.map(|at_pixel| Linearization {
+                residual_px: at_pixel.residual_px + corner.beyond_px,
+                ..at_pixel
+            }),
             turned_in_board,
             turned_in_rig,
         }

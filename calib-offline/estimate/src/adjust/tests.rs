@@ -126,6 +126,7 @@ fn example(has_spline: [bool; 2]) -> (Model, Observations) {
                     col,
                     point_in_board,
                     pixel,
+                    beyond_px: Vector2::zeros(),
                     relative_weight: 1.0,
                 });
             }

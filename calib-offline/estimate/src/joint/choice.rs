@@ -8,6 +8,7 @@ use super::fit::Fit;
 use super::rebase::rebase;
 use crate::adjust::{CameraModel, Model, Observations};
 use calib_rays::field::spline::{Spline, SplineGrid};
+use calib_rays::field::structured::TILT_DEGREE;
 use serde::{Deserialize, Serialize};
 
 /// Spacing of a first spline, in cells along the sensor's longer side: 56 px on 1280 px.
@@ -62,6 +63,12 @@ pub enum Alternative {
     },
     /// All cameras lose their splines.
     NoSpline,
+    /// The polynomials of all directions are held at what a plain lens does, or those of one
+    /// degree.
+    Plain {
+        /// Total degree; `None` for all.
+        degree: Option<usize>,
+    },
 }
 
 /// An alternative that was tried.
@@ -234,6 +241,19 @@ impl Search<'_> {
         }
     }
 
+    /// A weight of its own follows the noise of what the data hardly determine, in half of the
+    /// families. So all are held if that costs no evidence to speak of.
+    fn plain(&mut self) {
+        for degree in [None, Some(TILT_DEGREE)] {
+            let mut fit = self.best.fit.clone();
+            if fit.smoothness.hold_directions(degree)
+                && self.take_fit_if_better(Alternative::Plain { degree }, -NEEDED_GAIN, fit)
+            {
+                break;
+            }
+        }
+    }
+
     fn drop_spline(&mut self) -> bool {
         self.take_if_better(Alternative::NoSpline, -NEEDED_GAIN, |model| {
             for camera in &mut model.cameras {
@@ -276,6 +296,7 @@ impl Search<'_> {
         if self.best.fit.model.has_spline() && changed {
             self.drop_spline();
         }
+        self.plain();
     }
 
     fn take_if_better(

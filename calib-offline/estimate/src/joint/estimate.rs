@@ -17,10 +17,11 @@ use nalgebra::Vector2;
 /// Total degree of the field's polynomial (METHOD 2.1, 9A).
 const DEGREE: usize = 7;
 /// Adjustments with structured directions only, so many and each to such a precision: what they
-/// leave is far below what the rounds after them change.
+/// leave is far below what the rounds after them change. Two or three steps each, more where boards
+/// hardly tilt.
 const STRUCTURED_ROUNDS: usize = 3;
 const STRUCTURED: Settings = Settings {
-    max_iterations: 3,
+    max_iterations: 30,
     relative_decrease: 1e-4,
 };
 /// How often the base lenses are fitted anew.
@@ -31,6 +32,9 @@ pub(super) const LAST: Settings = Settings {
     max_iterations: 30,
     relative_decrease: 1e-8,
 };
+
+/// Last adjustments, each with residuals taken where the one before sees the corners.
+const ANCHORS: usize = 2;
 
 /// The result of the joint estimate.
 #[derive(Debug, Clone)]
@@ -92,7 +96,12 @@ pub fn estimate(observations: &Observations, start: &RigStart) -> Result<Estimat
         best = choice::simplify(best, &mut choices, &observations);
     }
     let mut fit = best.fit;
-    fit.adjust(&observations, LAST);
+    for _ in 0..ANCHORS {
+        let anchored = observations.anchored(fit.residuals());
+        fit = fit.on(&anchored);
+        fit.adjust(&anchored, LAST);
+    }
+    let fit = fit.on(&observations);
     Ok(finish(fit, observations, correlation, choices))
 }
 

@@ -7,11 +7,13 @@ use crate::adjust::model::Layout;
 use crate::adjust::priors::{CameraPriors, Priors};
 use crate::adjust::{CameraModel, Model};
 use calib_rays::field::knot_order::KnotOrder;
+use calib_rays::field::structured::{PLAIN_DEGREE, TILT_DEGREE};
 use calib_rays::numerics::banded::BandedMatrix;
 use nalgebra::DVector;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 /// Inverse variances at the start: directions may move by 1e-3 rad, an offset by 1e-3 mm, a
@@ -21,6 +23,13 @@ const START_DIRECTION: f64 = 1e6;
 const START_OFFSET: f64 = 1e6;
 /// Where offsets go first: they may move by 0.1 mm.
 const FREE_OFFSET: f64 = 1e2;
+/// What a plain lens has beyond a rotationally symmetric one is expected to be so large, RMS over
+/// the sensor, as a share of the square of half the sensor's longer side in focal lengths; and the
+/// expectation counts as much as one number more (METHOD 2.9).
+const PLAIN_SHARE: f64 = 1e-3;
+const PLAIN_COUNT: f64 = 1.0;
+/// Where no base lens was fitted yet, its center is not known either: 0.01 in s.
+const PLAIN_START: f64 = 1e4;
 /// Beyond this a parameter is held to round-off and a larger weight changes nothing.
 const MOST_PRECISION: f64 = 1e14;
 /// Longest step of a weight's logarithm in one update.
@@ -38,7 +47,8 @@ const PROBE_SEED: u64 = 0x5eed;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Family {
-    /// Directions of the field's polynomial of this total degree, beyond the structured ones.
+    /// Directions of the field's polynomial of this total degree, beyond the structured ones; of
+    /// degree 1, aspect and decentering; of degree 0, skew and tilt.
     Direction(usize),
     /// The spline deviation of the direction.
     Spline,
@@ -56,11 +66,50 @@ struct Group {
     /// Which of the camera's amounts belong; empty for a spline (all do).
     members: Vec<usize>,
     precision: f64,
+    /// What was expected of the weight: as much as so many numbers of such a mean square. Without
+    /// that a weight runs to nothing or to infinity where the data determine none of its numbers.
+    expected: Expected,
+    /// Whether it is held at zero for good.
+    held: bool,
     /// What the weight of a spline is of.
     energy: Option<Arc<SplineEnergy>>,
     last_log_step: f64,
     growth: f64,
     effective: f64,
+}
+
+/// A Gamma density of a weight beforehand.
+#[derive(Debug, Clone, Copy, Default)]
+struct Expected {
+    count: f64,
+    mean_square: f64,
+}
+
+impl Expected {
+    fn of(family: Family, camera: &CameraModel) -> Self {
+        if !is_structured(family) {
+            return Self::default();
+        }
+        let sensor = camera.field.sensor;
+        let half = f64::from(sensor.width.max(sensor.height)) / 2.0 / camera.field.base.focal_px;
+        Self {
+            count: PLAIN_COUNT,
+            mean_square: (PLAIN_SHARE * half * half).powi(2),
+        }
+    }
+
+    /// Twice the logarithm of what the weight of a group that is not held adds to the evidence: its
+    /// density (over its logarithm) times the width that is left to it, which Laplace's
+    /// approximation gives. So models with and without the group compare.
+    fn ln_evidence_twice(&self, group: &Group) -> f64 {
+        if group.held || self.count == 0.0 {
+            return 0.0;
+        }
+        // Of half a number, as Gamma(1/2) is the root of pi.
+        let scaled = group.precision * self.count * self.mean_square / 2.0;
+        let width_squared = 2.0 / (group.effective + self.count);
+        scaled.ln() - 2.0 * scaled - PI.ln() + (TAU * width_squared).ln()
+    }
 }
 
 /// The thin-plate energy of a grid, with what is asked of it in every round.
@@ -121,9 +170,31 @@ impl Smoothness {
     pub fn structured_only(model: &Model) -> Self {
         let mut smoothness = Self::new(model);
         for group in &mut smoothness.groups {
-            group.precision = MOST_PRECISION;
+            group.precision = match group.family {
+                Family::Direction(PLAIN_DEGREE) => PLAIN_START,
+                Family::Direction(TILT_DEGREE) => 1.0 / group.expected.mean_square,
+                _ => MOST_PRECISION,
+            };
         }
         smoothness
+    }
+
+    /// Holds the polynomials of directions of one total degree, or of all, of all cameras at zero;
+    /// `false` if none was free. What a plain lens has stays.
+    pub fn hold_directions(&mut self, degree: Option<usize>) -> bool {
+        let mut any = false;
+        for group in &mut self.groups {
+            if let Family::Direction(own) = group.family
+                && own != PLAIN_DEGREE
+                && degree.is_none_or(|degree| degree == own)
+            {
+                any |= group.precision < MOST_PRECISION;
+                group.precision = MOST_PRECISION;
+                group.held = true;
+                group.effective = 0.0;
+            }
+        }
+        any
     }
 
     /// Fits the families to a model: known ones keep their weights, new ones get their start,
@@ -138,7 +209,9 @@ impl Smoothness {
                 let known = old
                     .iter()
                     .find(|g| g.camera_idx == camera_idx && g.family == family);
+                let expected = Expected::of(family, camera);
                 let start = match family {
+                    Family::Direction(PLAIN_DEGREE | TILT_DEGREE) => 1.0 / expected.mean_square,
                     Family::Direction(_) => START_DIRECTION,
                     Family::Spline => camera.field.base.focal_px.powi(2) / variance_px2,
                     Family::Pupil | Family::Offset(_) => START_OFFSET,
@@ -159,6 +232,8 @@ impl Smoothness {
                     family,
                     members,
                     precision: known.map_or(start, |g| g.precision * g.rescaled(energy.as_ref())),
+                    expected,
+                    held: known.is_some_and(|g| g.held),
                     energy,
                     last_log_step: 0.0,
                     growth: 1.0,
@@ -172,6 +247,7 @@ impl Smoothness {
     pub fn put_offsets_first(&mut self) {
         for group in &mut self.groups {
             group.precision = match group.family {
+                Family::Direction(PLAIN_DEGREE | TILT_DEGREE) => continue,
                 Family::Direction(_) => MOST_PRECISION,
                 Family::Pupil | Family::Offset(_) => FREE_OFFSET,
                 Family::Spline => continue,
@@ -214,7 +290,7 @@ impl Smoothness {
     /// and `energy = a^T S a`.
     pub fn update(&mut self, model: &Model, layout: &Layout, reduced: &SchurComplement) {
         let variances = reduced.marginal_variances();
-        for group in &mut self.groups {
+        for group in self.groups.iter_mut().filter(|group| !group.held) {
             let camera = &model.cameras[group.camera_idx];
             let (dimension, trace, energy) = match group.family {
                 Family::Spline => {
@@ -261,7 +337,8 @@ impl Smoothness {
             .map(|group| {
                 let count = parameter_count(group, &model.cameras[group.camera_idx]) as f64;
                 let energy = group.energy.as_ref().map_or(0.0, |e| e.ln_determinant);
-                count * group.precision.ln() + energy
+                let expected = group.expected.ln_evidence_twice(group);
+                count * group.precision.ln() + energy + expected
             })
             .sum()
     }
@@ -293,7 +370,9 @@ impl Group {
 
     fn step(&mut self, dimension: f64, trace: f64, energy: f64) {
         self.effective = (dimension - self.precision * trace).clamp(1e-6 * dimension, dimension);
-        let wanted = (self.effective / energy.max(f64::MIN_POSITIVE)).min(MOST_PRECISION);
+        let Expected { count, mean_square } = self.expected;
+        let energy = (energy + count * mean_square).max(f64::MIN_POSITIVE);
+        let wanted = ((self.effective + count) / energy).min(MOST_PRECISION);
         let log_step = (wanted / self.precision).ln();
         self.growth = if log_step * self.last_log_step > 0.0 {
             (self.growth * STEP_GROWTH).min(MOST_GROWTH)
@@ -323,6 +402,11 @@ fn parameter_count(group: &Group, camera: &CameraModel) -> usize {
         Family::Spline => camera.spline_amounts().len(),
         _ => group.members.len(),
     }
+}
+
+/// What every lens may use, held by what is expected of lenses and not by smoothness alone.
+fn is_structured(family: Family) -> bool {
+    matches!(family, Family::Direction(PLAIN_DEGREE | TILT_DEGREE))
 }
 
 /// The families of a camera with their members.

@@ -9,6 +9,7 @@ mod error;
 pub mod estimate;
 pub mod evidence;
 pub mod fit;
+pub mod more_boards;
 pub mod point_covariance;
 pub mod rebase;
 pub mod recheck;

@@ -4,7 +4,11 @@
 use super::covariance::{RIGID_RANK_SHARE, node, points_by_predictions};
 use super::error::EstimateError;
 use super::estimate::Estimate;
+use crate::adjust::Model;
 use crate::adjust::equations::covariance::sighting_covariance;
+use crate::adjust::equations::normal_equations::NormalEquations;
+use crate::adjust::equations::schur_complement::SchurComplement;
+use crate::adjust::model::Layout;
 use calib_rays::field::{Rig, transport};
 use calib_rays::geometry::PixelPoint;
 use calib_rays::geometry::so3::skew;
@@ -27,27 +31,8 @@ impl Estimate {
         rig: &Rig,
         matches: &[[(usize, PixelPoint); 2]],
     ) -> Result<Option<DMatrix<f64>>, EstimateError> {
-        let (layout, equations, reduced) = self.fit.equations(&self.observations)?;
-        let covariance = || {
-            let mut points = Vec::new();
-            let mut nodes = Vec::new();
-            for sightings in matches {
-                let point = rig.triangulate(sightings).ok()?.point_mm;
-                nodes.push(
-                    sightings
-                        .map(|(camera, pixel)| node(camera, &rig.cameras[camera], pixel, point)),
-                );
-                points.push(point);
-            }
-            let sightings: Vec<_> = nodes.iter().flatten().map(|node| node.sighting).collect();
-            // The datum is the first pose.
-            let (predictions, _) =
-                sighting_covariance(&self.model, &layout, &equations, &reduced, 0, &sightings)?;
-            let to_points = points_by_predictions(&nodes)?;
-            let shape = without_motions(&rigid_motions(&points))? * to_points;
-            Some(&shape * predictions * shape.transpose())
-        };
-        Ok(covariance())
+        let found = self.fit.equations(&self.observations)?;
+        Ok(shape_covariance(&self.model, &found, rig, matches))
     }
 
     /// Covariance of where the rays of one camera pass at a distance from it, from what the
@@ -100,6 +85,30 @@ impl Estimate {
         };
         Ok(covariance())
     }
+}
+
+/// [`Estimate::point_covariance`] of a model whose equations are at hand.
+pub(super) fn shape_covariance(
+    model: &Model,
+    (layout, equations, reduced): &(Layout, NormalEquations, SchurComplement),
+    rig: &Rig,
+    matches: &[[(usize, PixelPoint); 2]],
+) -> Option<DMatrix<f64>> {
+    let mut points = Vec::new();
+    let mut nodes = Vec::new();
+    for sightings in matches {
+        let point = rig.triangulate(sightings).ok()?.point_mm;
+        nodes.push(
+            sightings.map(|(camera, pixel)| node(camera, &rig.cameras[camera], pixel, point)),
+        );
+        points.push(point);
+    }
+    let sightings: Vec<_> = nodes.iter().flatten().map(|node| node.sighting).collect();
+    // The datum is the first pose.
+    let (predictions, _) = sighting_covariance(model, layout, equations, reduced, 0, &sightings)?;
+    let to_points = points_by_predictions(&nodes)?;
+    let shape = without_motions(&rigid_motions(&points))? * to_points;
+    Some(&shape * predictions * shape.transpose())
 }
 
 /// What a rigid motion (rotation vector, then translation) does to a point, along two axes.

@@ -1,10 +1,10 @@
 //! The polynomial directions a lens is expected to use, and the rest by degree.
 //!
 //! A free polynomial of degree 7 has 72 coefficients; few views cannot hold them all. So its space
-//! is split (METHOD 2.1, 9A): a *structured* span that every lens may use freely (affine map, three
-//! radial terms, decentering, tilt of the sensor, shift of the distortion's center), and for each
-//! degree the remaining directions, which a smoothness weight holds back as far as the evidence
-//! asks for it. All directions are orthonormal over the sensor, so a coefficient is the RMS
+//! is split (METHOD 2.1, 9A): what a rotationally symmetric lens does, which is free (focal length,
+//! three radial terms, shift of its center); what a plain lens has besides, held by one weak prior
+//! (aspect, skew, decentering, tilt of the sensor); and for each degree the remaining directions,
+//! which a smoothness weight holds back as far as the evidence asks for it. All directions are orthonormal over the sensor, so a coefficient is the RMS
 //! change of the half-angle vector that it makes.
 
 use super::base_lens::BaseLens;
@@ -19,6 +19,17 @@ const GAUGE_DIRECTIONS: usize = 3;
 
 /// Degrees of an offset field up to this share one smoothness weight.
 pub const OFFSET_CORE_DEGREE: usize = 3;
+
+/// The tag of what a pinhole with decentering has beyond a rotationally symmetric lens: aspect and
+/// decentering, under one prior.
+pub const PLAIN_DEGREE: usize = 1;
+/// The tag of skew and tilt, which a pinhole has not, under another. Before the center of a lens is
+/// known they are among those of [`PLAIN_DEGREE`], as a tilt is what its shift does.
+pub const TILT_DEGREE: usize = 0;
+
+/// Half-angle vectors of a lens whose decentering is that of its tangents are shorter than the root
+/// of this: 60 degrees off axis.
+const NARROW_SQUARED: f64 = 4.0 / 3.0;
 
 /// Lattice nodes along the longer side, for inner products over the sensor.
 const LATTICE: usize = 33;
@@ -46,21 +57,29 @@ impl StructuredBasis {
             orthonormal: Vec::new(),
             penalized_degree: Vec::new(),
         };
-        // The gauge first, so that it can be cut off; then the rest of the affine map.
+        // The gauge first, so that it can be cut off; then what a rotationally symmetric lens does.
         let affine: [fn(f64, f64) -> Vector2<f64>; 6] = [
             |_, _| Vector2::new(1.0, 0.0),
             |_, _| Vector2::new(0.0, 1.0),
             |x, _| Vector2::new(0.0, x),
+            |x, y| Vector2::new(x, y),
             |x, _| Vector2::new(x, 0.0),
             |_, y| Vector2::new(y, 0.0),
-            |_, y| Vector2::new(0.0, y),
         ];
+        let beyond = lens.map_or(PLAIN_DEGREE, |_| TILT_DEGREE);
+        let tags = [PLAIN_DEGREE, PLAIN_DEGREE, beyond, beyond];
+        let (symmetric, sheared) = affine.split_at(GAUGE_DIRECTIONS + 1);
         let half_width_px = f64::from(sensor.width) / 2.0;
         let center = lens.map_or(Vector2::zeros(), |lens| center_in_half_widths(sensor, lens));
-        let about_center = |f: &dyn Fn(f64, f64) -> Vector2<f64>| {
-            lattice.project(|x, y| f(x - center.x, y - center.y))
+        // A small shift in the image, seen through the lens that is there.
+        let through = |x: f64, y: f64, shift: Vector2<f64>| match lens {
+            Some(lens) => {
+                let at = Vector2::new(x, y) * half_width_px;
+                lens.evaluate(&at).1 * shift * half_width_px
+            }
+            None => shift,
         };
-        for f in affine {
+        for f in symmetric {
             builder.add(&lattice.project(f), None);
         }
         builder.add_radial(degree, &center);
@@ -70,17 +89,33 @@ impl StructuredBasis {
             |x, y| Vector2::new(x * x, x * y),
             |x, y| Vector2::new(x * y, y * y),
         ];
-        for f in decentering {
-            builder.add(&about_center(&f), None);
-        }
-        if let Some(lens) = lens {
-            for axis in 0..2 {
-                let shift = |x: f64, y: f64| {
-                    let (_, derivative) = lens.evaluate(&(Vector2::new(x, y) * half_width_px));
-                    derivative.column(axis) * half_width_px
-                };
-                builder.add(&lattice.project(shift), None);
+        for axis in 0..2 {
+            if let Some(lens) = lens {
+                builder.add(&lattice.shift(lens, half_width_px, axis), None);
             }
+        }
+        for (f, tag) in sheared.iter().zip([PLAIN_DEGREE, beyond]) {
+            let image_side = |x: f64, y: f64| through(x, y, f(x - center.x, y - center.y));
+            builder.add(&lattice.project(image_side), Some(tag));
+        }
+        let is_narrow = lens.is_some_and(|lens| {
+            let at = |p: &Vector2<f64>| lens.evaluate(&(p * half_width_px)).0.norm_squared();
+            lattice.nodes.iter().all(|p| at(p) < NARROW_SQUARED)
+        });
+        for (f, tag) in decentering.iter().zip(tags) {
+            let undistorted = |x: f64, y: f64| match lens {
+                // The tangent of the angle.
+                Some(lens) if is_narrow => {
+                    let s = lens.evaluate(&(Vector2::new(x, y) * half_width_px)).0;
+                    s / (1.0 - s.norm_squared() / 4.0)
+                }
+                _ => Vector2::new(x, y) - center,
+            };
+            let decentered = |x: f64, y: f64| {
+                let t = undistorted(x, y);
+                through(x, y, f(t.x, t.y))
+            };
+            builder.add(&lattice.project(decentered), Some(tag));
         }
         builder.add_degrees(2..=degree, degree, |total| total);
         builder.finish(degree, GAUGE_DIRECTIONS)
@@ -221,6 +256,25 @@ impl Lattice {
         out
     }
 
+    /// A shift of a lens's center along an axis with the turn of the camera frame that takes its
+    /// constant back, as constants are cut off: what a turn does besides is a tilt.
+    fn shift(&self, lens: &BaseLens, half_width_px: f64, axis: usize) -> DVector<f64> {
+        let at = |x: f64, y: f64| lens.evaluate(&(Vector2::new(x, y) * half_width_px));
+        let shifted = |x, y| at(x, y).1.column(axis) * half_width_px;
+        // Of the half-angle vector, by a turn that moves the middle along the axis.
+        let turned = |x, y| {
+            let s = at(x, y).0;
+            let mut by_turn = s * (s[axis] / 2.0);
+            by_turn[axis] += 1.0 - s.norm_squared() / 4.0;
+            by_turn
+        };
+        let sum = |f: &dyn Fn(f64, f64) -> Vector2<f64>| -> f64 {
+            self.nodes.iter().map(|p| f(p.x, p.y)[axis]).sum()
+        };
+        let back = sum(&shifted) / sum(&turned);
+        self.project(|x, y| shifted(x, y) - turned(x, y) * back)
+    }
+
     /// Applies a square matrix to each component of interleaved coefficients.
     fn per_component(matrix: &DMatrix<f64>, interleaved: &DVector<f64>) -> DVector<f64> {
         let n = matrix.nrows();
@@ -315,7 +369,9 @@ impl Builder<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::Projection;
+    use crate::field::{Projection, transport};
+    use crate::geometry::so3;
+    use nalgebra::Vector3;
 
     const SENSOR: SensorSize = SensorSize::new(640, 480);
 
@@ -330,8 +386,8 @@ mod tests {
                 .iter()
                 .filter(|d| d.is_none())
                 .count();
-            // Affine 6 - 3, decentering 2, projective 2, and the radial terms that fit.
-            assert_eq!(free, 7 + (degree - 1) / 2, "degree {degree}");
+            // The focal length, and the radial terms that fit.
+            assert_eq!(free, 1 + (degree - 1) / 2, "degree {degree}");
         }
     }
 
@@ -380,7 +436,7 @@ mod tests {
     }
 
     #[test]
-    fn a_shift_of_a_lens_is_free_to_first_order() {
+    fn a_shift_of_a_lens_with_its_turn_is_free_to_first_order() {
         let lens = BaseLens {
             center_px: [14.0, -8.0],
             radial: [0.1, -0.03, 0.01, 0.0],
@@ -389,15 +445,30 @@ mod tests {
         };
         let basis = StructuredBasis::new(SENSOR, 7, Some(&lens));
         let free = basis.penalized_degrees().iter().filter(|d| d.is_none());
-        assert_eq!(free.count(), 12);
+        assert_eq!(free.count(), 6);
         let lattice = Lattice::new(SENSOR, 7);
         for axis in 0..2 {
             let mut step = Vector2::zeros();
             step[axis] = 1e-3;
-            let at = |x: f64, y: f64, sign: f64| {
-                lens.evaluate(&(Vector2::new(x, y) * 320.0 + step * sign)).0
+            // The frame turns about the other axis, as far as leaves no constant.
+            let axis_of_turn = if axis == 0 {
+                Vector3::y()
+            } else {
+                -Vector3::x()
             };
-            let shift = lattice.project(|x, y| (at(x, y, 1.0) - at(x, y, -1.0)) * 1e3);
+            let at = |x: f64, y: f64, sign: f64, turn: f64| {
+                let shifted = Vector2::new(x, y) * 320.0 + step * sign;
+                let direction = transport::direction(&lens.evaluate(&shifted).0);
+                let turned = so3::exp(&(axis_of_turn * turn * sign)) * direction;
+                transport::half_angle(&turned).unwrap()
+            };
+            let constant = |turn: f64| {
+                let moved = |p: &Vector2<f64>| at(p.x, p.y, 1.0, turn) - at(p.x, p.y, -1.0, turn);
+                lattice.nodes.iter().map(|p| moved(p)[axis]).sum::<f64>()
+            };
+            let (still, per_turn) = (constant(0.0), (constant(1e-6) - constant(0.0)) / 1e-6);
+            let turn = -still / per_turn;
+            let shift = lattice.project(|x, y| (at(x, y, 1.0, turn) - at(x, y, -1.0, turn)) * 1e3);
             let terms = polynomial::term_count(7);
             let polynomial = Polynomial {
                 degree: 7,
