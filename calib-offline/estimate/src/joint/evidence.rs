@@ -247,10 +247,9 @@ impl Smoothness {
     pub fn put_offsets_first(&mut self) {
         for group in &mut self.groups {
             group.precision = match group.family {
-                Family::Direction(PLAIN_DEGREE | TILT_DEGREE) => continue,
+                Family::Spline | Family::Direction(PLAIN_DEGREE | TILT_DEGREE) => continue,
                 Family::Direction(_) => MOST_PRECISION,
                 Family::Pupil | Family::Offset(_) => FREE_OFFSET,
-                Family::Spline => continue,
             };
         }
     }
