@@ -50,6 +50,9 @@ const MATCHES: usize = 400;
 /// Quantile of a chi-square variable of 3 degrees of freedom at 95 %.
 const CHI_SQUARE_95: f64 = 7.8147;
 
+/// A match, and where this calibration and the pinhole have it.
+type Placed = (Exact, Vector3<f64>, Vector3<f64>);
+
 fn main() -> ExitCode {
     print_table(table)
 }
@@ -76,7 +79,9 @@ fn table(arguments: &Arguments) -> Result<()> {
         let drawn = arguments.drawn(name, |seed| draw(&boards, seed))?;
         if arguments.detail {
             for by_depth in &drawn {
-                by_depth.iter().for_each(|d| print!("  {}", words(*d)));
+                for depth in by_depth {
+                    print!("  {}", words(*depth));
+                }
                 println!();
             }
         }
@@ -126,7 +131,7 @@ fn draw(boards: &Boards, seed: u64) -> Result<[AtDepth; 3]> {
                 exact.push((found, ours.point_mm, theirs.point_mm));
             }
         }
-        let errors = |point: fn(&(Exact, Vector3<f64>, Vector3<f64>)) -> Vector3<f64>| {
+        let errors = |point: fn(&Placed) -> Vector3<f64>| {
             let (from, to): (Vec<_>, Vec<_>) = exact.iter().map(|e| (point(e), e.0.0)).unzip();
             let placement = best_placement(&from, &to)?;
             let errors = from
