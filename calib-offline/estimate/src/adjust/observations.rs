@@ -13,12 +13,19 @@ use std::sync::Arc;
 
 /// Corners that are predicted farther away are outliers and keep their place.
 const FARTHEST_ANCHOR_PX: f64 = 3.0;
+/// Standard deviation of each coefficient of a board's shape before anything is seen, mm, where nobody
+/// says how flat the board is.
+pub const BOARD_SHAPE_SD_MM: f64 = 0.1;
+/// A board that is said to be flatter is taken to be as flat as this, mm: no measurement sees it.
+const FLATTEST_MM: f64 = 1e-6;
 
 /// All views offered to an adjustment.
 #[derive(Debug, Clone)]
 pub struct Observations {
     /// The board.
     pub board: BoardSpec,
+    /// Standard deviation of each coefficient of its shape before anything is seen, mm.
+    pub board_shape_sd_mm: f64,
     /// Sensor per camera.
     pub sensors: Vec<SensorSize>,
     /// Numbers of the poses, rising; a pose's index here is its index everywhere in `adjust`.
@@ -106,6 +113,7 @@ impl Observations {
         blocks.sort_by_key(|block| (block.camera_idx, block.pose_idx));
         Self {
             board,
+            board_shape_sd_mm: BOARD_SHAPE_SD_MM,
             sensors,
             poses,
             views: blocks,
@@ -128,6 +136,16 @@ impl Observations {
             }
         }
         anchored
+    }
+
+    /// The same of a board whose flatness is known, if it is: standard deviation of each coefficient of
+    /// its shape, mm.
+    #[must_use]
+    pub fn with_flatness(mut self, sd_mm: Option<f64>) -> Self {
+        if let Some(sd_mm) = sd_mm {
+            self.board_shape_sd_mm = sd_mm.max(FLATTEST_MM);
+        }
+        self
     }
 
     /// Number of different poses; one that was split counts once.
@@ -186,6 +204,7 @@ impl Observations {
             .collect();
         Self {
             board: self.board,
+            board_shape_sd_mm: self.board_shape_sd_mm,
             sensors: self.sensors.clone(),
             poses: kept.iter().map(|idx| self.poses[*idx]).collect(),
             views,

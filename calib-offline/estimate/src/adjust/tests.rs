@@ -5,7 +5,7 @@ use super::equations::normal_equations::NormalEquations;
 use super::levenberg::{Settings, minimize};
 use super::model::{CameraModel, Model, Step};
 use super::objective::{Weights, residuals};
-use super::observations::{Observations, ObservedCorner, ViewBlock};
+use super::observations::{BOARD_SHAPE_SD_MM, Observations, ObservedCorner, ViewBlock};
 use super::priors::{CameraPriors, Priors};
 use super::residual::linearize;
 use calib_rays::board::{BoardShape, BoardSpec};
@@ -139,6 +139,7 @@ fn example(has_spline: [bool; 2]) -> (Model, Observations) {
     }
     let observations = Observations {
         board: BOARD,
+        board_shape_sd_mm: BOARD_SHAPE_SD_MM,
         sensors: vec![SENSOR; 2],
         poses: (0..model.rig_from_board.len()).collect(),
         views,

@@ -378,6 +378,7 @@ impl Screening<'_> {
         let old = self.observations;
         let mut observations = Observations {
             board: old.board,
+            board_shape_sd_mm: old.board_shape_sd_mm,
             sensors: old.sensors.clone(),
             poses: Vec::new(),
             views: Vec::new(),

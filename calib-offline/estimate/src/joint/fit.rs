@@ -14,9 +14,6 @@ use crate::adjust::robust::{StudentT, reweight};
 use crate::adjust::{Model, Observations, StopReason};
 use nalgebra::Vector2;
 
-/// Standard deviation of each coefficient of the board's shape before anything is seen, mm.
-const BOARD_SHAPE_SD_MM: f64 = 0.1;
-
 /// The adjustment where a round's step went too far.
 const RETRY: Settings = Settings {
     max_iterations: 2,
@@ -30,6 +27,8 @@ pub struct Fit {
     pub model: Model,
     /// Its smoothness weights.
     pub smoothness: Smoothness,
+    /// Standard deviation of each coefficient of the board's shape before anything is seen, mm.
+    pub board_shape_sd_mm: f64,
     /// Distribution of the residuals.
     pub noise: StudentT,
     /// Share of corners that count as independent.
@@ -54,6 +53,7 @@ impl Fit {
         Self {
             model,
             smoothness,
+            board_shape_sd_mm: observations.board_shape_sd_mm,
             noise: StudentT {
                 freedom: 4.0,
                 variance_px2: 1.0,
@@ -151,7 +151,7 @@ impl Fit {
     /// The priors that go with the smoothness.
     pub fn priors(&self) -> Priors {
         self.smoothness
-            .priors(&self.model, 1.0 / (BOARD_SHAPE_SD_MM * BOARD_SHAPE_SD_MM))
+            .priors(&self.model, 1.0 / (self.board_shape_sd_mm * self.board_shape_sd_mm))
     }
 
     /// New weights, then an adjustment with them.
