@@ -24,7 +24,7 @@ use calib_judge::held_out::folds_wanted;
 use calib_judge::plausibility::Sheet;
 use calib_judge::unexpected_optics::unexpected_optics;
 use calib_judge::verdict::Thresholds;
-use calib_judge::{Folds, held_out};
+use calib_judge::{BoardErrors, Folds, Task, held_out};
 use calib_rays::field::RayTable;
 use calib_rays::progress::Progress;
 use calib_recording::dataset::Dataset;
@@ -48,6 +48,8 @@ pub struct CalibrateSettings {
     pub ray_tables: bool,
     /// How noisy the pixels of matches will be, px, if somebody knows: for predictions only.
     pub match_noise_px: Option<f64>,
+    /// The measurement whose error is to be predicted.
+    pub task: Option<Task>,
 }
 
 impl Default for CalibrateSettings {
@@ -59,6 +61,7 @@ impl Default for CalibrateSettings {
             detect: DetectSettings::default(),
             ray_tables: false,
             match_noise_px: None,
+            task: None,
         }
     }
 }
@@ -129,6 +132,15 @@ pub fn calibrate(
     Ok(calibrated)
 }
 
+/// What the board's certificate says of its lengths.
+fn board_errors(dataset: &Dataset) -> BoardErrors {
+    let certificate = dataset.certificate;
+    BoardErrors {
+        scale_ppm_sd: certificate.and_then(|c| c.scale_ppm_sd),
+        temperature_ppm_sd: certificate.and_then(|c| c.expansion_ppm_sd()),
+    }
+}
+
 /// [`calibrate`] from corners that are there already; keeps what the check was made from.
 ///
 /// # Errors
@@ -153,6 +165,13 @@ pub fn calibrate_corners(
         .method
         .fit(&given, progress)
         .map_err(|error| explained(error, dataset, &views))?;
+
+    // Before all that takes long: it may be that it cannot be answered.
+    let task = settings.task.map(|task| {
+        let board = board_errors(dataset);
+        solution.own.expected_error(&solution.rig, &task, &board)
+    });
+    let task = task.transpose()?;
 
     let used = &solution.observations;
     let folds = folds_wanted(used, settings.folds);
@@ -194,6 +213,7 @@ pub fn calibrate_corners(
         checks: checks.as_ref(),
         causes: &causes,
         explained: &sheet.explained,
+        task: task.as_ref(),
         thresholds: &settings.thresholds,
     });
     Ok(Checked {

@@ -5,6 +5,7 @@ use super::error::Error;
 use super::match_noise::parse;
 use super::output::Console;
 use super::place::check_results_folder;
+use super::usage_error::UsageError;
 use crate::methods::{self, Method};
 use crate::pipeline::{CalibrateError, CalibrateSettings, Calibrated};
 use crate::report::facts::Facts;
@@ -21,7 +22,8 @@ use std::path::{Path, PathBuf};
 const EXAMPLE: &str = "\
 Example:
   calib-offline calibrate recordings/monday -o results/monday
-  calib-offline calibrate recordings/monday -o results/without --exclude 3,17";
+  calib-offline calibrate recordings/monday -o results/without --exclude 3,17
+  calib-offline calibrate recordings/monday -o results/monday --task 'length 100 mm at 800 mm'";
 
 const FORMATS: &str = "\
 DATASET is a folder with dataset.toml and corners.csv or images; corners win. The output folder is
@@ -32,11 +34,25 @@ With --ray-tables it holds rays_NAME.npy too: for each pixel (row, column) six n
 precision, a point of its ray nearest to the camera (mm) and the unit direction into the scene, both in the
 rig's frame; NaN where there is no ray. Those of --method alternating are its own, pixel by pixel.
 
+With --task 'length 100 mm at 800 mm' the expected error of that measurement is part of all results: its standard
+deviation and 95 % limit from the joint covariance of both ends, RMS over places in the calibrated area at that
+distance from the first camera and seven directions at each (its u, v and optical axis, and four diagonals), and
+the worst line. Its shares add up in squares: pixel noise (as large as that of the corners), calibration, board's
+scale, shape and temperature. What [board.certificate] does not say of scale and temperature is not in it.
+
 With --json, schema calib-offline/calibrate/1; a figure that does not apply is null:
   verdict, reasons
   causes (cause, since_pose, size, cost_mm, text, grade)
                                  what was found about the recording, most likely first; cost_mm: RMS error
                                  that it leaves in points; grade: the best verdict that it allows
+  task                           null without --task; lengths in mm
+  task (length_mm, distance_mm, sd_mm, error95_mm, if_ends_independent_mm, places, lines, pixel_noise_px)
+                                 sd_mm: RMS over lines; if_ends_independent_mm: did the ends not go together
+  task.worst (direction, middle_px, sd_mm, error95_mm)
+                                 direction: along-u, along-v, depth or diagonal
+  task.shares_mm (pixel_noise, calibration, board_scale, board_shape, temperature)
+                                 scale and temperature are null where the certificate does not say
+  task.directions (direction, lines, sd_mm)
   held_out_neighbor_percent, held_out_neighbor_mm, held_out_rigid_mm, held_out_rms_px
   half_data_mm, half_data_ratio  points of two calibrations from half of the poses: RMS difference,
                                  and over what was predicted
@@ -77,6 +93,9 @@ pub struct CalibrateArgs {
     /// [default: as the corners]
     #[arg(long, value_name = "S", value_parser = parse)]
     pub match_noise_px: Option<f64>,
+    /// Predict the error of a measurement, such as "length 100 mm at 800 mm"
+    #[arg(long, value_name = "TASK")]
+    pub task: Option<String>,
     /// Write one ray per pixel of each camera too: `rays_NAME.npy`
     #[arg(long)]
     pub ray_tables: bool,
@@ -139,6 +158,8 @@ pub fn run(
     console: &Console,
     estimate: Estimate<'_>,
 ) -> Result<Outcome, Error> {
+    let task = args.task.as_ref().map(|words| words.parse()).transpose();
+    let task = task.map_err(UsageError::Task)?;
     check_results_folder(&args.output, &FILES, args.force)?;
     let mut dataset = Dataset::load(&args.dataset)?;
     if args.ray_tables {
@@ -155,6 +176,7 @@ pub fn run(
         method: args.method.method(),
         ray_tables: args.ray_tables,
         match_noise_px: args.match_noise_px,
+        task,
         ..CalibrateSettings::default()
     };
     let written = calibrate_into(&args.output, &dataset, &settings, console, estimate)?;

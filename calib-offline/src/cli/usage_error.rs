@@ -1,6 +1,7 @@
 //! Requests that cannot be met.
 
 use crate::pipeline::NoSuchPose;
+use calib_judge::TaskWordsError;
 use calib_rays::remedy::Remedy;
 use std::path::PathBuf;
 
@@ -60,6 +61,9 @@ pub enum UsageError {
          one dataset by calib-offline methods"
     )]
     CompareIsMethods,
+    /// A measurement that nobody can read.
+    #[error("--task: no error can be predicted")]
+    Task(#[source] TaskWordsError),
     /// The input would be replaced by the output.
     #[error("{}: is what the command reads", path.display())]
     OutputIsInput {
@@ -80,6 +84,7 @@ impl Remedy for UsageError {
                 "calibrate two cameras together; a single one gives rays only"
             }
             Self::NoSuchPose(error) => return error.remedy(),
+            Self::Task(error) => return error.remedy(),
             Self::NoDevice => "give its address, such as --device tcp:127.0.0.1:7777",
             Self::NotPacked { .. } => {
                 "pack it first: calib-offline pack calibration.json -o rig.rays"

@@ -10,7 +10,9 @@ use calib_judge::half_data::Split;
 use calib_judge::held_out::Estimated;
 use calib_judge::suspects::{left_open_mm, suspects};
 use calib_judge::working_volume::span;
-use calib_judge::{Cause, CrossChecks, cross_check};
+use calib_judge::{
+    BoardErrors, Cause, CrossChecks, ExpectedError, Task, TaskError, cross_check, expected_error,
+};
 use calib_rays::field::Rig;
 use calib_rays::progress::Progress;
 use std::collections::BTreeSet;
@@ -87,6 +89,15 @@ impl Own for Estimate {
     fn left_open_mm(&self, rig: &Rig) -> Option<f64> {
         let distances = span(&self.board_distances_mm(rig));
         left_open_mm(&mut self.clone(), rig, &distances)
+    }
+
+    fn expected_error(
+        &self,
+        rig: &Rig,
+        task: &Task,
+        board: &BoardErrors,
+    ) -> Result<ExpectedError, TaskError> {
+        expected_error(self, rig, task, board)
     }
 
     fn suspects(&self, rig: &Rig) -> Vec<Cause> {

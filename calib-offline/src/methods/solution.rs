@@ -6,7 +6,7 @@ use calib_estimate::adjust::{Observations, StopReason};
 use calib_estimate::init::screening::Finding;
 use calib_judge::half_data::Split;
 use calib_judge::known_points::{Points, measure};
-use calib_judge::{Cause, CrossChecks};
+use calib_judge::{BoardErrors, Cause, CrossChecks, ExpectedError, Task, TaskError};
 use calib_rays::board::BoardShape;
 use calib_rays::field::{RayTable, Rig};
 use calib_rays::geometry::{RigidTransform, SensorSize};
@@ -82,6 +82,19 @@ pub trait Own: Debug + Send + Sync {
     /// RMS of what it leaves open of points at its working distance, mm; `rig` is that of the solution.
     fn left_open_mm(&self, _rig: &Rig) -> Option<f64> {
         None
+    }
+
+    /// What a measurement with it can be expected to be off by; `rig` is that of the solution.
+    ///
+    /// # Errors
+    /// [`TaskError`]; by default that it is not known.
+    fn expected_error(
+        &self,
+        _rig: &Rig,
+        _task: &Task,
+        _board: &BoardErrors,
+    ) -> Result<ExpectedError, TaskError> {
+        Err(TaskError::NoCovariance)
     }
 
     /// What explains its residuals better than noise, most important first; `rig` is that of the

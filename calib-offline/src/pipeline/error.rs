@@ -1,7 +1,7 @@
 //! Why a dataset gives no calibration.
 
 use crate::methods::MethodError;
-use calib_judge::Cause;
+use calib_judge::{Cause, TaskError};
 use calib_rays::remedy::Remedy;
 use calib_recording::dataset::{CornersError, SufficiencyError};
 use calib_recording::detect::DetectError;
@@ -47,6 +47,9 @@ pub enum CalibrateError {
     /// No answer.
     #[error(transparent)]
     Method(#[from] MethodError),
+    /// A measurement whose error cannot be expected.
+    #[error("the error of this measurement cannot be predicted")]
+    Task(#[from] TaskError),
 }
 
 /// A pose to leave out that the recording does not have.
@@ -65,6 +68,7 @@ impl CalibrateError {
         match self {
             Self::Corners(_) | Self::Exclude(_) => false,
             Self::Detect(error) => matches!(error, DetectError::Consistency(_)),
+            Self::Task(error) => error.is_undetermined(),
             Self::Sufficiency(_)
             | Self::FewImages { .. }
             | Self::Implausible { .. }
@@ -89,6 +93,7 @@ impl Remedy for CalibrateError {
                 "correct that first; calib-offline inspect DATASET says what else is to be seen".to_owned(),
             ),
             Self::Method(error) => error.remedy(),
+            Self::Task(error) => error.remedy(),
         }
     }
 }

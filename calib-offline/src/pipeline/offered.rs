@@ -33,7 +33,8 @@ pub fn offered(dataset: &Dataset, corners: &Corners) -> Result<Offered, Calibrat
         .map_err(|error| with_refusals(dataset, error, corners.detection.as_ref()))?;
     let sensors = dataset.cameras.iter().map(|camera| camera.sensor).collect();
     Ok(Offered {
-        observations: Observations::new(dataset.board, sensors, &views),
+        observations: Observations::new(dataset.board, sensors, &views)
+            .with_flatness(dataset.certificate.and_then(|c| c.flatness_mm_sd)),
         views,
     })
 }

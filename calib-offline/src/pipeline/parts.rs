@@ -6,7 +6,7 @@ use calib_estimate::adjust::Observations;
 use calib_judge::agreement::Agreement;
 use calib_judge::plausibility::Explained;
 use calib_judge::verdict::Thresholds;
-use calib_judge::{Cause, CrossChecks, HeldOut};
+use calib_judge::{Cause, CrossChecks, ExpectedError, HeldOut};
 use calib_recording::dataset::Dataset;
 
 /// Results of all steps.
@@ -33,6 +33,8 @@ pub struct Parts<'a> {
     pub causes: &'a [Cause],
     /// Views that are meant otherwise than they are written.
     pub explained: &'a [Explained],
+    /// The expected error of the measurement asked for.
+    pub task: Option<&'a ExpectedError>,
     /// What counts as good.
     pub thresholds: &'a Thresholds,
 }

@@ -35,6 +35,8 @@ pub fn record(parts: &Parts) -> Calibration {
         method: solution.method.to_string(),
         input_sha256: input_sha256(parts.dataset, &parts.corners.views),
         board: parts.dataset.board,
+        certificate: parts.dataset.certificate,
+        recording: parts.dataset.recording.clone(),
         board_shape: solution.board_shape.clone(),
         stage_axes: stage_axes(parts, &poses),
         poses,
@@ -48,6 +50,7 @@ pub fn record(parts: &Parts) -> Calibration {
         held_out,
         checks: parts.checks.cloned(),
         causes: parts.causes.to_vec(),
+        task: parts.task.cloned(),
         verdict,
     }
 }

@@ -108,6 +108,9 @@ pub fn calibration() -> Calibration {
         choices: Some(choices()),
         checks: Some(checks()),
         causes: Vec::new(),
+        certificate: None,
+        recording: None,
+        task: None,
         alternating: None,
         held_out: Some(held_out()),
         verdict: Verdict {

@@ -10,6 +10,7 @@ use super::plot::{
     uncertainty_map,
 };
 use super::procedure;
+use super::sign_page;
 use super::record::{Calibration, HeldOutRecord};
 use super::words;
 use crate::present::numbers::short;
@@ -38,6 +39,7 @@ pub fn page(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
                     (verdict(&facts))
                     (causes_page::draw(calibration))
                     (headline(calibration, &facts, blob))
+                    (sign_page::draw(calibration))
                     (figures(calibration))
                     @if let Some(blob) = blob {
                         (group("Blob", blob_curve::draw(blob).as_slice(),

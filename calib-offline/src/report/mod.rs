@@ -8,8 +8,10 @@ pub mod html;
 pub mod left_out_page;
 pub mod plot;
 mod procedure;
+mod sign_page;
 pub mod record;
 pub mod store;
+pub mod task;
 pub mod text;
 pub mod words;
 

@@ -7,11 +7,12 @@ pub use calib_judge::agreement::Agreement;
 pub use calib_judge::held_out::FailedFold;
 pub use calib_judge::stage_axis::StageAxis;
 pub use calib_judge::verdict::{Grade, Verdict};
-pub use calib_judge::{Cause, CrossChecks};
+pub use calib_judge::{Cause, CrossChecks, ExpectedError};
 pub use calib_rays::board::BoardShape;
 use calib_rays::board::BoardSpec;
 use calib_rays::field::Rig;
 use calib_rays::geometry::{PixelPoint, RigidTransform};
+pub use calib_recording::dataset::{Certificate, RecordingSpec};
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
@@ -33,8 +34,15 @@ pub struct Calibration {
     /// SHA-256 of the manifest and of the corners that went in, hex. With the tool's version it
     /// identifies the calibration.
     pub input_sha256: String,
-    /// The board as the manifest describes it.
+    /// The board as it was while it was recorded: as the manifest describes it, longer by what its
+    /// certificate says of its temperature.
     pub board: BoardSpec,
+    /// What the manifest says of the board's lengths, if it does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub certificate: Option<Certificate>,
+    /// What the manifest says of the recording, if it does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recording: Option<RecordingSpec>,
     /// Out-of-plane shape found for the board.
     pub board_shape: BoardShape,
     /// The calibrated cameras.
@@ -68,6 +76,9 @@ pub struct Calibration {
     /// What was found about the recording, most likely first.
     #[serde(default)]
     pub causes: Vec<Cause>,
+    /// The expected error of the measurement that was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub task: Option<ExpectedError>,
     /// The judgement.
     pub verdict: Verdict,
 }

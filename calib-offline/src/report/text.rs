@@ -4,6 +4,7 @@ use super::BlobFacts;
 use super::facts::Facts;
 use super::procedure;
 use super::record::{Calibration, Grade};
+use super::task;
 use super::words;
 use crate::present::numbers::short;
 use std::fmt::Write as _;
@@ -26,6 +27,8 @@ pub fn summary(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
         lines.push(("found", format!("{}: {text}", cause.code.word())));
     }
     lines.push(("held-out error", held_out(calibration, &facts)));
+    lines.extend(task::facts(calibration));
+    lines.extend(task::certificate(calibration));
     lines.push((
         "corner noise",
         format!(

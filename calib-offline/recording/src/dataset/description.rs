@@ -3,7 +3,7 @@
 use super::target::TargetSpec;
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::SensorSize;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
@@ -22,7 +22,7 @@ pub struct Dataset {
     pub excluded_poses: BTreeSet<usize>,
     /// The measurement target, if the manifest describes one. No calibration depends on it.
     pub target: Option<TargetSpec>,
-    /// What the board's maker or a measurement says of it.
+    /// What the board's maker or a measurement says of it. `board` is as warm as it says.
     pub certificate: Option<Certificate>,
     /// Who recorded it, and when.
     pub recording: Option<RecordingSpec>,
@@ -103,22 +103,47 @@ pub enum ExpectedOptics {
 }
 
 /// Standard deviations and temperatures of the board; a key that is not given is not known.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Certificate {
     /// Of the scale, parts per million.
     pub scale_ppm_sd: Option<f64>,
-    /// Of the face from a plane, mm.
+    /// Of the face from a plane, mm: of each coefficient of the shape that is estimated.
     pub flatness_mm_sd: Option<f64>,
     /// Thermal expansion, parts per million and kelvin.
     pub expansion_ppm_per_k: Option<f64>,
+    /// Its standard deviation; not given, it counts as exact.
+    pub expansion_ppm_per_k_sd: Option<f64>,
     /// Temperature at which its lengths hold, degrees Celsius.
     pub calibrated_at_c: Option<f64>,
     /// Temperature while it was recorded, degrees Celsius.
     pub used_at_c: Option<f64>,
+    /// Its standard deviation, kelvin; not given, it counts as exact.
+    pub used_at_c_sd: Option<f64>,
+}
+
+impl Certificate {
+    /// By how much the board was longer while it was recorded than certified, parts per million; `None` if one
+    /// of the three numbers that it takes is not given.
+    pub fn expansion_ppm(&self) -> Option<f64> {
+        Some(self.expansion_ppm_per_k? * (self.used_at_c? - self.calibrated_at_c?))
+    }
+
+    /// Standard deviation of [`Self::expansion_ppm`], to first order, parts per million; `None` where no standard
+    /// deviation is given.
+    pub fn expansion_ppm_sd(&self) -> Option<f64> {
+        self.expansion_ppm()?;
+        if self.expansion_ppm_per_k_sd.is_none() && self.used_at_c_sd.is_none() {
+            return None;
+        }
+        let warmer_k = self.used_at_c? - self.calibrated_at_c?;
+        let by_expansion = warmer_k * self.expansion_ppm_per_k_sd.unwrap_or(0.0);
+        let by_temperature = self.expansion_ppm_per_k? * self.used_at_c_sd.unwrap_or(0.0);
+        Some(by_expansion.hypot(by_temperature))
+    }
 }
 
 /// What the recording is called, who made it, and when; text as it stands in the manifest.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct RecordingSpec {
     /// Name.
     pub name: Option<String>,
@@ -135,4 +160,30 @@ pub struct StageSpec {
     pub angles_deg: Option<Vec<f64>>,
     /// Stage placement per pose; poses of one placement share one axis.
     pub placement: Option<Vec<usize>>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_board_that_is_warmer_than_certified_is_longer() {
+        let mut certificate = Certificate {
+            expansion_ppm_per_k: Some(9.0),
+            calibrated_at_c: Some(20.0),
+            used_at_c: Some(23.5),
+            ..Certificate::default()
+        };
+        assert_eq!(certificate.expansion_ppm(), Some(31.5));
+        assert_eq!(certificate.expansion_ppm_sd(), None);
+        // 3.5 K of 1.2 ppm/K, and 0.5 K of 9 ppm/K.
+        certificate.expansion_ppm_per_k_sd = Some(1.2);
+        assert_eq!(certificate.expansion_ppm_sd(), Some(3.5 * 1.2));
+        certificate.used_at_c_sd = Some(0.5);
+        let both = 4.2f64.hypot(4.5);
+        assert!((certificate.expansion_ppm_sd().unwrap() - both).abs() < 1e-12);
+        certificate.used_at_c = None;
+        assert_eq!(certificate.expansion_ppm(), None);
+        assert_eq!(certificate.expansion_ppm_sd(), None);
+    }
 }

@@ -19,6 +19,10 @@ pub fn input_sha256(dataset: &Dataset, views: &[View]) -> String {
         "board {} {} {}",
         board.rows, board.cols, board.square_mm
     );
+    // Its scale is in the squares; the rest changes no estimate.
+    if let Some(flatness_mm) = dataset.certificate.and_then(|c| c.flatness_mm_sd) {
+        let _ = writeln!(facts, "flatness {flatness_mm}");
+    }
     for camera in &dataset.cameras {
         let _ = writeln!(facts, "camera {} {}", camera.name, camera.sensor);
     }
@@ -60,7 +64,7 @@ pub fn hex(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::CameraSpec;
+    use crate::dataset::{CameraSpec, Certificate};
     use calib_rays::board::BoardSpec;
     use calib_rays::geometry::{PixelPoint, SensorSize};
     use calib_rays::observed::Corner;
@@ -103,10 +107,14 @@ mod tests {
         moved.folder = "b".into();
         assert_eq!(input_sha256(&moved, &views), hash);
 
-        let mut changed = vec![dataset.clone(), dataset.clone(), dataset.clone()];
+        let mut changed = vec![dataset.clone(); 4];
         changed[0].board.square_mm = 10.000000000000002;
         changed[1].excluded_poses.clear();
         changed[2].cameras[0].sensor.width = 641;
+        changed[3].certificate = Some(Certificate {
+            flatness_mm_sd: Some(0.01),
+            ..Certificate::default()
+        });
         for other in changed {
             assert_ne!(input_sha256(&other, &views), hash);
         }

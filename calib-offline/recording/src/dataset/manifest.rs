@@ -134,14 +134,17 @@ fn board(
     } else if value > MAX_SQUARE_MM {
         "more than ten meters (the unit is mm)"
     } else {
+        let certificate = raw.certificate;
+        let certificate = certificate.map(|raw| declared::certificate(source, raw));
+        let certificate = certificate.transpose()?;
+        let expansion_ppm = certificate.and_then(|c| c.expansion_ppm());
         let board = BoardSpec {
             rows: rows as usize,
             cols: cols as usize,
-            square_mm: value,
+            // As it was while it was recorded.
+            square_mm: expansion_ppm.map_or(value, |ppm| value * (1.0 + 1e-6 * ppm)),
         };
-        let certificate = raw.certificate;
-        let certificate = certificate.map(|raw| declared::certificate(source, raw));
-        return Ok((board, certificate.transpose()?));
+        return Ok((board, certificate));
     };
     Err(ManifestError::SquareSize {
         file,

@@ -34,6 +34,7 @@ fn args(folder: &Path) -> CalibrateArgs {
         output: folder.join("deep/results"),
         method: MethodArg::Joint,
         exclude: vec![3, 17],
+        task: None,
         ray_tables: false,
         match_noise_px: None,
         force: false,

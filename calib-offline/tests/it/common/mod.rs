@@ -209,6 +209,9 @@ pub fn calibration() -> Calibration {
         held_out: None,
         checks: None,
         causes: Vec::new(),
+        certificate: None,
+        recording: None,
+        task: None,
         verdict: Verdict {
             grade: Grade::Pass,
             reasons: Vec::new(),

@@ -8,6 +8,8 @@ use toml::Spanned;
 
 /// Coldest and hottest that a board can be meant to be, degrees Celsius.
 const TEMPERATURE_C: (f64, f64) = (-273.15, 1000.0);
+/// Least and most that a solid can be meant to expand, parts per million and kelvin.
+const EXPANSION_PPM_PER_K: (f64, f64) = (-100.0, 300.0);
 
 /// Standard deviations must not be negative, temperatures must be such.
 pub(super) fn certificate(
@@ -37,10 +39,16 @@ pub(super) fn certificate(
         expansion_ppm_per_k: within(
             raw.expansion_ppm_per_k,
             "expansion_ppm_per_k",
-            (f64::MIN, f64::MAX),
+            EXPANSION_PPM_PER_K,
+        )?,
+        expansion_ppm_per_k_sd: within(
+            raw.expansion_ppm_per_k_sd,
+            "expansion_ppm_per_k_sd",
+            deviation,
         )?,
         calibrated_at_c: within(raw.calibrated_at_c, "calibrated_at_c", TEMPERATURE_C)?,
         used_at_c: within(raw.used_at_c, "used_at_c", TEMPERATURE_C)?,
+        used_at_c_sd: within(raw.used_at_c_sd, "used_at_c_sd", deviation)?,
     })
 }
 

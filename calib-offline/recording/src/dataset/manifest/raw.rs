@@ -39,8 +39,10 @@ pub(super) struct RawCertificate {
     pub scale_ppm_sd: Option<Spanned<f64>>,
     pub flatness_mm_sd: Option<Spanned<f64>>,
     pub expansion_ppm_per_k: Option<Spanned<f64>>,
+    pub expansion_ppm_per_k_sd: Option<Spanned<f64>>,
     pub calibrated_at_c: Option<Spanned<f64>>,
     pub used_at_c: Option<Spanned<f64>>,
+    pub used_at_c_sd: Option<Spanned<f64>>,
 }
 
 #[derive(Deserialize)]
