@@ -11,6 +11,7 @@ pub mod grade;
 pub mod half_data;
 pub mod held_out;
 pub mod known_points;
+pub mod lengths;
 pub mod measured_board;
 pub mod neighbor_noise;
 pub mod plausibility;

@@ -4,7 +4,7 @@
 pub use crate::field::Gap;
 use crate::field::{MeasureError, Rig};
 use crate::geometry::{PixelPoint, RigidTransform, TriangulateError};
-use nalgebra::RealField;
+use nalgebra::{Matrix3, RealField};
 use std::str::FromStr;
 
 /// The numbers that a source computes with. Pixels are read straight into it and points written
@@ -79,6 +79,11 @@ pub trait PointSource: Sync {
     fn gap(&self, _sightings: &[Sighting<Self::Number>]) -> Option<Gap> {
         None
     }
+
+    /// Covariance of that point in its frame, all that is known of it, mm^2; `None` where the rig does not say.
+    fn covariance_mm2(&self, _sightings: &[Sighting<Self::Number>]) -> Option<Matrix3<f64>> {
+        None
+    }
 }
 
 /// Turns many matches of two cameras at once into points: for one that is far away.
@@ -127,14 +132,8 @@ impl<'a> RigSource<'a> {
         })
     }
 
-    /// Of two sightings only: a rig knows pairs.
     fn sigma_mm(&self, sightings: &[Sighting<f64>]) -> Option<[f64; 3]> {
-        let [a, b] = *sightings else { return None };
-        let in_rig = self.rig.pair_covariance([pixel(a), pixel(b)])?.total_mm2();
-        let covariance_mm2 = match &self.frame_from_rig {
-            None => in_rig,
-            Some(frame) => frame.rotation * in_rig * frame.rotation.transpose(),
-        };
+        let covariance_mm2 = self.covariance_mm2(sightings)?;
         Some([0, 1, 2].map(|k| covariance_mm2[(k, k)].max(0.0).sqrt()))
     }
 }
@@ -168,6 +167,16 @@ impl PointSource for RigSource<'_> {
     fn gap(&self, sightings: &[Sighting<f64>]) -> Option<Gap> {
         let [a, b] = *sightings else { return None };
         self.rig.pair_gap([pixel(a), pixel(b)])
+    }
+
+    /// Of two sightings only: a rig knows pairs.
+    fn covariance_mm2(&self, sightings: &[Sighting<f64>]) -> Option<Matrix3<f64>> {
+        let [a, b] = *sightings else { return None };
+        let in_rig = self.rig.pair_covariance([pixel(a), pixel(b)])?.total_mm2();
+        Some(match &self.frame_from_rig {
+            None => in_rig,
+            Some(frame) => frame.rotation * in_rig * frame.rotation.transpose(),
+        })
     }
 }
 

@@ -9,7 +9,7 @@ use super::usage_error::UsageError;
 use crate::methods::{self, Method};
 use crate::pipeline::{CalibrateError, CalibrateSettings, Calibrated};
 use crate::report::facts::Facts;
-use crate::report::record::Grade;
+use crate::report::record::{ExpectedError, Grade};
 use crate::report::{BlobFacts, Calibration, html, text};
 use calib_blob::pack::{PackSettings, pack_nearest};
 use calib_rays::progress::Progress;
@@ -45,14 +45,12 @@ With --json, schema calib-offline/calibrate/1; a figure that does not apply is n
   causes (cause, since_pose, size, cost_mm, text, grade)
                                  what was found about the recording, most likely first; cost_mm: RMS error
                                  that it leaves in points; grade: the best verdict that it allows
-  task                           null without --task; lengths in mm
-  task (length_mm, distance_mm, sd_mm, error95_mm, if_ends_independent_mm, places, lines, pixel_noise_px)
-                                 sd_mm: RMS over lines; if_ends_independent_mm: did the ends not go together
-  task.worst (direction, middle_px, sd_mm, error95_mm)
-                                 direction: along-u, along-v, depth or diagonal
-  task.shares_mm (pixel_noise, calibration, board_scale, board_shape, temperature)
-                                 scale and temperature are null where the certificate does not say
-  task.directions (direction, lines, sd_mm)
+  task (length_mm, distance_mm, sd_mm, error95_mm, worst (direction, middle_px, sd_mm, error95_mm),
+    shares_mm (pixel_noise, calibration, board_scale, board_shape, temperature), if_ends_independent_mm,
+    directions (direction, lines, sd_mm), places, lines, pixel_noise_px)
+                                 null without --task; sd_mm: RMS over lines; direction: along-u, along-v, depth
+                                 or diagonal; a share is null where the certificate does not say;
+                                 if_ends_independent_mm: sd_mm, did the errors of the ends not go together
   held_out_neighbor_percent, held_out_neighbor_mm, held_out_rigid_mm, held_out_rms_px
   half_data_mm, half_data_ratio  points of two calibrations from half of the poses: RMS difference,
                                  and over what was predicted
@@ -143,6 +141,7 @@ struct CalibrateObject<'a> {
     schema: &'static str,
     #[serde(flatten)]
     facts: Facts,
+    task: Option<&'a ExpectedError>,
     blob: BlobFacts,
     calibration: &'a Path,
     rig: &'a Path,
@@ -184,6 +183,7 @@ pub fn run(
     let object = CalibrateObject {
         schema: "calib-offline/calibrate/1",
         facts: Facts::of(&written.calibration),
+        task: written.calibration.task.as_ref(),
         blob: written.blob.clone(),
         calibration,
         rig,

@@ -8,7 +8,7 @@ use crate::device::DeviceError;
 use crate::pipeline::CalibrateError;
 use crate::report::store::CalibrationError;
 use calib_blob::export::ExportError;
-use calib_blob::matches::{MatchesError, NoiseError};
+use calib_blob::matches::{LengthsError, MatchesError, NoiseError};
 use calib_blob::pack::{BlobError, PackError};
 use calib_rays::remedy::Remedy;
 use calib_recording::atomic_file::WriteError;
@@ -50,6 +50,9 @@ pub enum Error {
     /// Gaps that do not say how noisy matches are.
     #[error("the noise of the matches cannot be estimated")]
     Noise(#[from] NoiseError),
+    /// Known lengths that were read.
+    #[error("the lengths cannot be used")]
+    Lengths(#[from] LengthsError),
     /// A rig that was to be packed.
     #[error("the calibration cannot be packed")]
     Pack(#[from] PackError),
@@ -176,6 +179,7 @@ impl Remedy for Error {
             Self::Blob(error) => error.remedy(),
             Self::Matches(error) => error.remedy(),
             Self::Noise(error) => error.remedy(),
+            Self::Lengths(error) => error.remedy(),
             Self::Pack(error) => error.remedy(),
             Self::Export(error) => error.remedy(),
             Self::Device(error) => error.remedy(),

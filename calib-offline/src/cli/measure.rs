@@ -3,6 +3,7 @@
 
 use super::Outcome;
 use super::error::Error;
+use super::lengths::{self, check_lengths};
 use super::match_noise::{in_f32, parse};
 use super::output::Console;
 use super::place::check_file;
@@ -10,11 +11,13 @@ use super::rig_file::{RigFile, open};
 use super::usage_error::UsageError;
 use crate::device::{DeviceSource, connect};
 use crate::present::numbers::short;
+use crate::report::record::Grade;
 use calib_blob::matches::{
     BlobSource, MatchesError, MeasureSummary, NoiseError, NoiseEstimate, POINTS_HEADER,
     StreamError, measure_batches, measure_with_blob, measure_with_calibration, noise_with_blob,
     noise_with_calibration,
 };
+use calib_judge::lengths::CheckedLengths;
 use calib_rays::measure::{PointSource, RigSource};
 use calib_recording::atomic_file::{PendingFile, WriteError};
 use clap::Args;
@@ -29,6 +32,7 @@ Example:
   calib-offline measure results/rig.rays matches.csv -o points.csv
   calib-offline measure results/calibration.json matches.csv -o points.csv --frame left
   calib-offline measure results/rig.rays matches.csv -o points.csv --match-noise-px 0.2
+  calib-offline measure results/calibration.json matches.csv -o points.csv --lengths bar.csv
   calib-offline measure --device tcp:127.0.0.1:7777 matches.csv -o points.csv";
 
 const FORMATS: &str = "\
@@ -51,6 +55,11 @@ evaluated in double precision. With --device the device measures, with the blob 
 same bits as that blob gives here; matches of two cameras, in the rig's frame.
 An earlier POINTS.csv is replaced; any other file only with --force.
 
+LENGTHS.csv has the header id_a,id_b,length_mm or id_a,id_b,length_mm,limit_mm: known lengths between two of the
+matches, and what the length measurement error (measured minus known) may be at most; an empty limit is none.
+The exit code is 1 if one is exceeded. The standard deviation of an error is that of both ends along the length, taken as
+independent, and with a calibration that of its board's scale ([board.certificate]).
+
 With --json, schema calib-offline/measure/1:
   rig          the device's address with --device
   rig_kind     blob, calibration or device
@@ -58,7 +67,11 @@ With --json, schema calib-offline/measure/1:
   match_noise_px
                what sigma was computed with; null: the corners' noise, or what the device's blob says
   estimated_match_noise (px, low_px, high_px, gaps)
-               with --estimate-match-noise, and its 95 % interval; else null";
+               with --estimate-match-noise, and its 95 % interval; else null
+  known_lengths (verdict, inside, outside, not_measured, largest_error_mm, rms_error_mm, error_over_sd,
+    lengths (id_a, id_b, length_mm, measured_mm, error_mm, sd_mm, limit_mm, inside))
+               null without --lengths; verdict: fail beyond a limit, doubtful if one was not tested, null
+               without limits";
 
 /// The arguments.
 #[derive(Debug, Args)]
@@ -89,6 +102,9 @@ pub struct MeasureArgs {
     /// Find that from the gaps of these matches; it takes 100 of them
     #[arg(long, conflicts_with_all = ["match_noise_px", "device"])]
     pub estimate_match_noise: bool,
+    /// Check known lengths between the points: a file with id_a,id_b,length_mm[,limit_mm]
+    #[arg(long, value_name = "LENGTHS.csv", conflicts_with = "device")]
+    pub lengths: Option<PathBuf>,
     /// Replace whatever stands in the output's place
     #[arg(long)]
     pub force: bool,
@@ -106,6 +122,7 @@ struct MeasureObject<'a> {
     summary: MeasureSummary,
     #[serde(flatten)]
     noise: NoiseUsed,
+    known_lengths: Option<CheckedLengths>,
 }
 
 /// What the pixels' part of sigma comes from.
@@ -122,7 +139,16 @@ struct NoiseUsed {
 pub fn run(args: &MeasureArgs, console: &Console) -> Result<Outcome, Error> {
     let mut inputs = vec![args.matches.as_path()];
     inputs.extend(args.rig.as_deref());
+    inputs.extend(args.lengths.as_deref());
     check_file(&args.output, POINTS_HEADER.as_bytes(), &inputs, args.force)?;
+    // Before anything is written: there may be a mistake in it.
+    let check = |noise_px| match (&args.lengths, &args.rig) {
+        (Some(lengths), Some(rig)) => {
+            check_lengths(rig, &args.matches, lengths, noise_px).map(Some)
+        }
+        _ => Ok(None),
+    };
+    let mut known_lengths = check(args.match_noise_px)?;
     let (rig, kind, (summary, noise)) = match (&args.device, &args.rig) {
         (Some(address), _) => (Path::new(address), "device", measure_there(args, address)?),
         (None, Some(rig)) => {
@@ -131,6 +157,9 @@ pub fn run(args: &MeasureArgs, console: &Console) -> Result<Outcome, Error> {
         }
         (None, None) => return Err(Error::Usage(UsageError::NoDevice)),
     };
+    if args.estimate_match_noise {
+        known_lengths = check(noise.match_noise_px)?;
+    }
     let object = MeasureObject {
         schema: "calib-offline/measure/1",
         rig,
@@ -139,9 +168,14 @@ pub fn run(args: &MeasureArgs, console: &Console) -> Result<Outcome, Error> {
         output: &args.output,
         summary,
         noise,
+        known_lengths,
     };
     console.result(&in_words(&object), &object);
-    Ok(Outcome::Done)
+    let verdict = object.known_lengths.as_ref().and_then(|l| l.verdict);
+    Ok(match verdict {
+        Some(Grade::Fail) => Outcome::VerdictFail,
+        _ => Outcome::Done,
+    })
 }
 
 /// What became of the matches, and with which noise.
@@ -344,8 +378,12 @@ fn in_words(object: &MeasureObject<'_>) -> String {
         ));
     }
     format!(
-        "{}; written to {}",
+        "{}; written to {}{}",
         parts.join(", "),
-        object.output.display()
+        object.output.display(),
+        object
+            .known_lengths
+            .as_ref()
+            .map_or(String::new(), lengths::in_words)
     )
 }

@@ -64,6 +64,9 @@ pub enum UsageError {
     /// A measurement that nobody can read.
     #[error("--task: no error can be predicted")]
     Task(#[source] TaskWordsError),
+    /// Lengths between matches that pass by once.
+    #[error("--lengths: the matches come from standard input, and are read twice")]
+    LengthsOfStream,
     /// The input would be replaced by the output.
     #[error("{}: is what the command reads", path.display())]
     OutputIsInput {
@@ -84,6 +87,7 @@ impl Remedy for UsageError {
                 "calibrate two cameras together; a single one gives rays only"
             }
             Self::NoSuchPose(error) => return error.remedy(),
+            Self::LengthsOfStream => "write the matches to a file first",
             Self::Task(error) => return error.remedy(),
             Self::NoDevice => "give its address, such as --device tcp:127.0.0.1:7777",
             Self::NotPacked { .. } => {

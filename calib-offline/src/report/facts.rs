@@ -1,7 +1,7 @@
 //! The few numbers that stand at the top of every summary: on the page, on the terminal, in JSON.
 //! Each is read or measured off the record; nothing is estimated here.
 
-use super::record::{Calibration, Cause, ExpectedError, Grade};
+use super::record::{Calibration, Cause, Grade};
 use super::words;
 use calib_judge::central_model::CentralModel;
 use calib_judge::half_data::HalfDataCheck;
@@ -17,8 +17,6 @@ pub struct Facts {
     pub reasons: Vec<String>,
     /// What was found about the recording, most likely first.
     pub causes: Vec<Cause>,
-    /// The expected error of the measurement asked for.
-    pub task: Option<ExpectedError>,
     /// RMS error of neighboring-corner distances on boards never seen, % of the square.
     pub held_out_neighbor_percent: Option<f64>,
     /// The same, mm.
@@ -108,7 +106,6 @@ impl Facts {
             verdict: calibration.verdict.grade,
             reasons: calibration.verdict.reasons.clone(),
             causes: calibration.causes.clone(),
-            task: calibration.task.clone(),
             held_out_neighbor_percent: neighbor_percent,
             held_out_neighbor_mm: neighbor_percent
                 .map(|percent| percent / 100.0 * calibration.board.square_mm),

@@ -10,8 +10,8 @@ use super::plot::{
     uncertainty_map,
 };
 use super::procedure;
-use super::sign_page;
 use super::record::{Calibration, HeldOutRecord};
+use super::sign_page;
 use super::words;
 use crate::present::numbers::short;
 use calib_judge::half_data::HalfDataCheck;

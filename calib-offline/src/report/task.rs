@@ -83,10 +83,16 @@ pub fn certificate(calibration: &Calibration) -> Vec<(&'static str, String)> {
     };
     let mut facts = Vec::new();
     if let Some(ppm) = certificate.scale_ppm_sd {
-        facts.push(("board's scale", format!("standard deviation {} ppm", short(ppm))));
+        facts.push((
+            "board's scale",
+            format!("standard deviation {} ppm", short(ppm)),
+        ));
     }
     if let Some(mm) = certificate.flatness_mm_sd {
-        facts.push(("board's flatness", format!("standard deviation {} mm", short(mm))));
+        facts.push((
+            "board's flatness",
+            format!("standard deviation {} mm", short(mm)),
+        ));
     }
     let temperature = match (
         certificate.expansion_ppm(),
@@ -107,7 +113,8 @@ pub fn certificate(calibration: &Calibration) -> Vec<(&'static str, String)> {
         }
         (None, None, None) if certificate.expansion_ppm_per_k.is_none() => None,
         _ => Some(
-            "not corrected for: it takes expansion_ppm_per_k, calibrated_at_c and used_at_c".to_owned(),
+            "not corrected for: it takes expansion_ppm_per_k, calibrated_at_c and used_at_c"
+                .to_owned(),
         ),
     };
     facts.extend(temperature.map(|words| ("temperature", words)));
@@ -137,7 +144,12 @@ mod tests {
             panic!("{facts:?}")
         };
         assert_eq!(*name, "temperature");
-        assert!(words.starts_with("squares of 10.000270 mm at 23 C, corrected by +27.0 ppm from 10.000000 mm at 20 C"), "{words}");
+        assert!(
+            words.starts_with(
+                "squares of 10.000270 mm at 23 C, corrected by +27.0 ppm from 10.000000 mm at 20 C"
+            ),
+            "{words}"
+        );
         calibration.certificate = Some(Certificate {
             used_at_c: None,
             ..declared

@@ -40,10 +40,15 @@ const SIMULATE: [&str; 16] = [
 fn from_a_recording_to_points() {
     let home = dataset(MANIFEST, corners_csv(6).as_bytes());
     let path = home.path();
-    let measure = "id,u_left,v_left,u_right,v_right\na,320,240,320,240\n";
+    let measure = "id,u_left,v_left,u_right,v_right\na,320,240,320,240\nb,330,250,330,250\n";
     fs::write(path.join("matches.csv"), measure).unwrap();
+    fs::write(path.join("lengths.csv"), "id_a,id_b,length_mm\na,b,9\n").unwrap();
 
-    let calibrated = json(path, &["calibrate", "set", "-o", "out"]);
+    let task = ["--task", "length 20 mm at 500 mm"];
+    let calibrated = json(
+        path,
+        &[&["calibrate", "set", "-o", "out"][..], &task].concat(),
+    );
     assert_documented("calibrate", "calib-offline/calibrate/1", &[calibrated], &[]);
     for (file, kind) in [
         ("set", "dataset"),
@@ -62,7 +67,8 @@ fn from_a_recording_to_points() {
     let exported = json(path, &export);
     assert_documented("export", "calib-offline/export/1", &[exported], &[]);
     let measure = ["measure", "new.rays", "matches.csv", "-o", "points.csv"];
-    let measured = json(path, &measure);
+    let lengths = ["--lengths", "lengths.csv"];
+    let measured = json(path, &[measure.as_slice(), &lengths].concat());
     // Nothing was estimated; `match_noise` compares an object in which it was.
     assert_listed("measure", "calib-offline/measure/1", &[measured]);
 }

@@ -34,6 +34,18 @@ impl<'a> BlobSource<'a> {
         self.noise = Some(noise);
         self
     }
+
+    fn pair(
+        &self,
+        a: Sighting<f32>,
+        b: Sighting<f32>,
+    ) -> Result<Measurement, ray_runtime::MeasureError> {
+        let (a, b) = (pixel(a), pixel(b));
+        match self.noise {
+            Some(noise) => self.blob.triangulate_with_noise(a, b, noise),
+            None => self.blob.triangulate_with_covariance(a, b),
+        }
+    }
 }
 
 fn pixel((camera_idx, [u, v]): Sighting<f32>) -> (usize, PixelPoint) {
@@ -53,11 +65,7 @@ impl PointSource for BlobSource<'_> {
     fn point(&self, sightings: &[Sighting<f32>]) -> Result<Point<f32>, Status> {
         // A blob knows pairs.
         let result = if let [a, b] = *sightings {
-            let (a, b) = (pixel(a), pixel(b));
-            match self.noise {
-                Some(noise) => self.blob.triangulate_with_noise(a, b, noise),
-                None => self.blob.triangulate_with_covariance(a, b),
-            }
+            self.pair(a, b)
         } else {
             let sightings: Vec<_> = sightings.iter().copied().map(pixel).collect();
             let found = self.blob.triangulate_many(&sightings);
@@ -106,14 +114,31 @@ impl PointSource for BlobSource<'_> {
             mm2_per_px2: of_one_px_mm2 - calibration_mm2,
         })
     }
+
+    fn covariance_mm2(&self, sightings: &[Sighting<f32>]) -> Option<Matrix3<f64>> {
+        let [a, b] = *sightings else { return None };
+        let in_rig = self.pair(a, b).ok()?.covariance?.total_mm2();
+        let covariance_mm2 = match &self.rig_from_frame {
+            None => in_rig,
+            Some(rig_from_frame) => covariance_in_frame(rig_from_frame, &in_rig),
+        };
+        Some(covariance_mm2.map(f64::from))
+    }
+}
+
+fn covariance_in_frame(
+    rig_from_frame: &ray_runtime::RigFromCamera,
+    covariance_mm2: &Matrix3<f32>,
+) -> Matrix3<f32> {
+    let rotation = &rig_from_frame.rotation;
+    rotation.transpose() * covariance_mm2 * rotation
 }
 
 fn sigma_in_frame(
     rig_from_frame: &ray_runtime::RigFromCamera,
     covariance_mm2: &Matrix3<f32>,
 ) -> [f32; 3] {
-    let rotation = &rig_from_frame.rotation;
-    let in_frame = rotation.transpose() * covariance_mm2 * rotation;
+    let in_frame = covariance_in_frame(rig_from_frame, covariance_mm2);
     // Round-off may leave less than nothing of a variance near zero.
     [0, 1, 2].map(|k| in_frame[(k, k)].max(0.0).sqrt())
 }

@@ -53,6 +53,18 @@ pub enum MatchesError {
         /// Matches.
         need: usize,
     },
+    /// An id that is asked for, and that two matches have.
+    #[error("{}:{line}: the id \"{id}\" stands in line {first_line} already", file.display())]
+    IdTwice {
+        /// The file.
+        file: PathBuf,
+        /// From 1.
+        line: usize,
+        /// From 1.
+        first_line: usize,
+        /// The id.
+        id: String,
+    },
     /// A line that is no match.
     #[error("{}:{line}: {problem}", file.display())]
     Row {
@@ -163,6 +175,7 @@ impl Remedy for MatchesError {
                 "simulate the dataset again, or take the table away: without it nothing is compared \
                  with the truth"
             }
+            Self::IdTwice { .. } => "give each match that is an end of a length an id of its own",
             Self::Row { problem, .. } => match problem {
                 RowProblem::NotText => "save the file as UTF-8 text",
                 RowProblem::FieldCount { .. } => {

@@ -5,18 +5,22 @@
 //! memory does not grow with them.
 
 pub mod blob_source;
+mod chosen;
 mod error;
 mod header;
 pub mod known;
+pub mod lengths;
 mod list;
 mod noise;
 mod row;
 mod stream;
 
 pub use blob_source::BlobSource;
+pub use chosen::read_chosen;
 pub use error::MatchesError;
 pub use header::Columns;
 pub use known::{KnownMatches, TruePoint, read_known};
+pub use lengths::{KnownLength, LengthProblem, LengthsError, read_lengths};
 pub use list::read_matches;
 pub use noise::{NoiseError, NoiseEstimate, noise_with_blob, noise_with_calibration};
 pub use row::POINTS_HEADER;

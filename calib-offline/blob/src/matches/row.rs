@@ -38,6 +38,13 @@ pub(super) fn parse<'a, N: Number>(
     Ok(id)
 }
 
+/// The id of a row, without the quotes that may protect it.
+pub(super) fn id(line: &str) -> Result<String, RowProblem> {
+    let (id, _) = split_id(line)?;
+    let inner = id.strip_prefix('"').and_then(|id| id.strip_suffix('"'));
+    Ok(inner.map_or_else(|| id.trim().to_owned(), |id| id.replace("\"\"", "\"")))
+}
+
 fn field_count(rest: Option<&str>, columns: &Columns) -> RowProblem {
     RowProblem::FieldCount {
         have: 1 + rest.map_or(0, |rest| rest.split(',').count()),

@@ -8,8 +8,8 @@ use std::path::Path;
 /// Paths such as `cameras.name`.
 type Keys = BTreeSet<String>;
 
-/// The files of `calibrate`, which are not facts of the calibration.
-const FILES_OF_CALIBRATE: [&str; 4] = ["blob", "calibration", "rig", "report"];
+/// The files of `calibrate` and what it was asked for, which are not facts of the calibration.
+const FILES_OF_CALIBRATE: [&str; 5] = ["blob", "calibration", "rig", "report", "task"];
 
 /// Fails unless the objects together have the keys that `VERB --help` lists for the schema, and no
 /// other. `never` are listed keys that none of these objects has, each with the reason.
