@@ -35,7 +35,9 @@ pub enum TaskError {
     #[error("a length takes two cameras, and there is one")]
     OneCamera,
     /// No board was there.
-    #[error("no board was recorded at {distance_mm} mm from the first camera: they were at {least_mm:.0} to {most_mm:.0} mm")]
+    #[error(
+        "no board was recorded at {distance_mm} mm from the first camera: they were at {least_mm:.0} to {most_mm:.0} mm"
+    )]
     NotCovered {
         /// The distance asked for.
         distance_mm: f64,
@@ -45,7 +47,9 @@ pub enum TaskError {
         most_mm: f64,
     },
     /// Too long.
-    #[error("no length of {length_mm} mm at {distance_mm} mm lies in what two cameras are calibrated for")]
+    #[error(
+        "no length of {length_mm} mm at {distance_mm} mm lies in what two cameras are calibrated for"
+    )]
     NoPlace {
         /// The length asked for.
         length_mm: f64,
@@ -113,12 +117,7 @@ impl Direction {
 
 /// The seven lines through a place, frame of the first camera.
 fn seven_lines() -> [(Direction, Vector3<f64>); 7] {
-    let diagonal = |x: f64, y: f64| {
-        (
-            Direction::Diagonal,
-            Vector3::new(x, y, 1.0) / 3.0f64.sqrt(),
-        )
-    };
+    let diagonal = |x: f64, y: f64| (Direction::Diagonal, Vector3::new(x, y, 1.0) / 3.0f64.sqrt());
     [
         (Direction::AlongU, Vector3::x()),
         (Direction::AlongV, Vector3::y()),

@@ -143,7 +143,11 @@ mod tests {
     fn end(x: f64, variance_mm2: f64) -> Option<End> {
         Some(End {
             point_mm: Vector3::new(x, 7.0, 500.0),
-            covariance_mm2: Some(Matrix3::from_diagonal(&Vector3::new(variance_mm2, 9.0, 9.0))),
+            covariance_mm2: Some(Matrix3::from_diagonal(&Vector3::new(
+                variance_mm2,
+                9.0,
+                9.0,
+            ))),
         })
     }
 
@@ -169,9 +173,18 @@ mod tests {
             check(&lengths, &ends, 0.0).verdict
         };
         assert_eq!(verdict(&[(None, measured)]), None);
-        assert_eq!(verdict(&[(Some(0.02), measured), (None, measured)]), Some(Grade::Pass));
+        assert_eq!(
+            verdict(&[(Some(0.02), measured), (None, measured)]),
+            Some(Grade::Pass)
+        );
         let unmeasured = (Some(0.02), [None, end(0.0, 1.0)]);
-        assert_eq!(verdict(&[(Some(0.02), measured), unmeasured]), Some(Grade::Doubtful));
-        assert_eq!(verdict(&[(Some(0.005), measured), unmeasured]), Some(Grade::Fail));
+        assert_eq!(
+            verdict(&[(Some(0.02), measured), unmeasured]),
+            Some(Grade::Doubtful)
+        );
+        assert_eq!(
+            verdict(&[(Some(0.005), measured), unmeasured]),
+            Some(Grade::Fail)
+        );
     }
 }

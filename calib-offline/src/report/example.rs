@@ -1,15 +1,16 @@
 //! A made-up but plausible calibration, to develop and test the report with.
 
 use super::record::{
-    BoardShape, Calibration, ChoicesRecord, CornerRecord, EstimateRecord, Grade, HeldOutRecord,
-    LeftOut, PoseRecord, Renumbered, SCHEMA, Verdict,
+    BoardShape, Calibration, Certificate, ChoicesRecord, CornerRecord, EstimateRecord, Grade,
+    HeldOutRecord, LeftOut, PoseRecord, RecordingSpec, Renumbered, SCHEMA, Verdict,
 };
 use calib_estimate::joint::{Alternative, Choice, Family, SmoothnessFound};
-use calib_judge::CrossChecks;
 use calib_judge::central_model::CentralModel;
 use calib_judge::centrality::Centrality;
+use calib_judge::expected_error::{Direction, OfDirection, Shares, WorstLine};
 use calib_judge::half_data::{HalfData, HalfDataCheck};
 use calib_judge::working_volume::PointDifference;
+use calib_judge::{CrossChecks, ExpectedError, Task};
 use calib_rays::board::BoardSpec;
 use calib_rays::field::uncertainty::packed;
 use calib_rays::field::{
@@ -108,9 +109,13 @@ pub fn calibration() -> Calibration {
         choices: Some(choices()),
         checks: Some(checks()),
         causes: Vec::new(),
-        certificate: None,
-        recording: None,
-        task: None,
+        certificate: Some(certificate()),
+        recording: Some(RecordingSpec {
+            name: Some("line 3, morning".to_owned()),
+            by: Some("A. Person".to_owned()),
+            date: None,
+        }),
+        task: Some(task()),
         alternating: None,
         held_out: Some(held_out()),
         verdict: Verdict {
@@ -263,6 +268,58 @@ fn checks() -> CrossChecks {
             modes: 9.0,
             ratio_by_chance: [0.546, 1.453],
         }),
+    }
+}
+
+fn certificate() -> Certificate {
+    Certificate {
+        scale_ppm_sd: Some(20.0),
+        flatness_mm_sd: Some(0.01),
+        expansion_ppm_per_k: Some(9.0),
+        calibrated_at_c: Some(20.0),
+        used_at_c: Some(23.0),
+        ..Certificate::default()
+    }
+}
+
+fn task() -> ExpectedError {
+    let shares_mm = Shares {
+        pixel_noise: 0.012,
+        calibration: 0.003,
+        board_scale: Some(0.002),
+        board_shape: 0.0006,
+        temperature: None,
+    };
+    let sd_mm = shares_mm.total_mm();
+    let of = |direction, lines, sd_mm| OfDirection {
+        direction,
+        lines,
+        sd_mm,
+    };
+    ExpectedError {
+        task: Task {
+            length_mm: 100.0,
+            distance_mm: 400.0,
+        },
+        sd_mm,
+        error95_mm: 1.96 * sd_mm,
+        worst: WorstLine {
+            direction: Direction::Depth,
+            middle_px: [212.0, 690.0],
+            sd_mm: 0.027,
+            error95_mm: 0.0529,
+        },
+        shares_mm,
+        if_ends_independent_mm: 0.0131,
+        directions: vec![
+            of(Direction::AlongU, 38, 0.0081),
+            of(Direction::AlongV, 41, 0.0062),
+            of(Direction::Depth, 45, 0.0212),
+            of(Direction::Diagonal, 150, 0.0127),
+        ],
+        places: 46,
+        lines: 274,
+        pixel_noise_px: SIGMA_PX,
     }
 }
 

@@ -261,6 +261,8 @@ mod tests {
         calibration.held_out = None;
         calibration.choices = None;
         calibration.checks = None;
+        (calibration.task, calibration.certificate) = (None, None);
+        calibration.recording = None;
         calibration.estimate.cost_per_iteration.clear();
         calibration.estimate.sigma_px = f64::NAN;
         assert_snapshot("bare_page", &visible_text(&page(&calibration, None)));

@@ -13,6 +13,7 @@ mod examples;
 mod experiments;
 mod export_command;
 mod joint_estimate;
+mod lengths;
 mod match_noise;
 mod methods;
 mod point_sigma;

@@ -71,6 +71,9 @@ mod tests {
         assert_eq!(found.len(), 2);
         assert_eq!(found["x,\"1\""], [(0, [1.0, 2.0]), (1, [3.0, 4.0])]);
         let error = chosen(&["9"]).unwrap_err().to_string();
-        assert!(error.contains("m.csv:5: the id \"9\" stands in line 4"), "{error}");
+        assert!(
+            error.contains("m.csv:5: the id \"9\" stands in line 4"),
+            "{error}"
+        );
     }
 }

@@ -168,7 +168,9 @@ pub fn read_lengths(file: &Path) -> Result<Vec<KnownLength>, LengthsError> {
     let mut last_line = 1;
     for row in rows {
         let row = row.map_err(|error| {
-            let line = error.position().map_or(last_line + 1, |at| at.line() as usize);
+            let line = error
+                .position()
+                .map_or(last_line + 1, |at| at.line() as usize);
             row_error(line, LengthProblem::NotText)
         })?;
         let line = row.position().map_or(0, |at| at.line() as usize);
@@ -252,7 +254,10 @@ mod tests {
             length(4, ["2", "1"], 50.0, None),
         ];
         assert_eq!(lengths, expected);
-        assert_eq!(read("id_a,id_b,length_mm\n1,2,3\n").unwrap()[0].limit_mm, None);
+        assert_eq!(
+            read("id_a,id_b,length_mm\n1,2,3\n").unwrap()[0].limit_mm,
+            None
+        );
     }
 
     #[test]
@@ -264,7 +269,10 @@ mod tests {
             ("id_a,id_b,length_mm\n".to_owned(), "l.csv: has no length"),
             (rows("1,3,10"), "l.csv:3: has 3 fields, the header has 4"),
             (rows("3,3,10,"), "l.csv:3: both ends are \"3\""),
-            (rows("2,1,10,"), "l.csv:3: the length from \"2\" to \"1\" stands in line 2"),
+            (
+                rows("2,1,10,"),
+                "l.csv:3: the length from \"2\" to \"1\" stands in line 2",
+            ),
             (rows("1,3,-10,"), "l.csv:3: length_mm is \"-10\""),
             (rows("1,3,0,"), "l.csv:3: length_mm is \"0\""),
             (rows("1,3,nan,"), "l.csv:3: length_mm is \"nan\""),

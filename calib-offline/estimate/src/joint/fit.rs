@@ -150,8 +150,10 @@ impl Fit {
 
     /// The priors that go with the smoothness.
     pub fn priors(&self) -> Priors {
-        self.smoothness
-            .priors(&self.model, 1.0 / (self.board_shape_sd_mm * self.board_shape_sd_mm))
+        self.smoothness.priors(
+            &self.model,
+            1.0 / (self.board_shape_sd_mm * self.board_shape_sd_mm),
+        )
     }
 
     /// New weights, then an adjustment with them.
