@@ -21,18 +21,13 @@ fn measurement(calibration: &Calibration) -> Markup {
             section.task {
                 h2 { "Length of " (found.task.length_mm) " mm at " (found.task.distance_mm) " mm" }
                 p { "Expected error: standard deviation " strong { (short(found.sd_mm)) " mm" } ", 95 % of errors within " strong { (short(found.error95_mm)) " mm" } ". Worst line: " (short(found.worst.sd_mm)) " mm, 95 % within " (short(found.worst.error95_mm)) " mm." }
-                div.scroll {
-                    table {
-                        thead { tr { th { "What makes it up" } th { "Standard deviation" } } }
-                        tbody {
-                            @for (name, share) in task::share_rows(&found.shares_mm) {
-                                tr { td { (name) } td.number { (share) } }
-                            }
-                        }
+                div.cards {
+                    @for (name, share) in task::share_rows(&found.shares_mm) {
+                        div.card { p.name { (name) } p.value { (share) } }
                     }
                 }
                 p.read { "By direction: " (task::by_direction(found)) ". " (task::assumed(found)) "." }
-                p.read { "Squares of the shares add up. What is not declared is not in it: [board.certificate] in dataset.toml. This is a prediction from the estimate, and no acceptance test: measure --lengths checks known lengths." }
+                p.read { "The five make it up: their squares add up. What is not declared is not in it ([board.certificate] in dataset.toml). This is a prediction from the estimate, and no acceptance test: measure --lengths checks known lengths." }
             }
         }
     }

@@ -89,10 +89,7 @@ pub fn certificate(calibration: &Calibration) -> Vec<(&'static str, String)> {
         ));
     }
     if let Some(mm) = certificate.flatness_mm_sd {
-        facts.push((
-            "board's flatness",
-            format!("standard deviation {} mm", short(mm)),
-        ));
+        facts.push(("flatness", format!("standard deviation {} mm", short(mm))));
     }
     let temperature = match (
         certificate.expansion_ppm(),

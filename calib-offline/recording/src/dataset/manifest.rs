@@ -141,8 +141,10 @@ fn board(
         let board = BoardSpec {
             rows: rows as usize,
             cols: cols as usize,
-            // As it was while it was recorded.
-            square_mm: expansion_ppm.map_or(value, |ppm| value * (1.0 + 1e-6 * ppm)),
+            // As it was while it was recorded, to a picometer: longer numbers only look exact.
+            square_mm: expansion_ppm.map_or(value, |ppm| {
+                (value * (1.0 + 1e-6 * ppm) * 1e9).round() / 1e9
+            }),
         };
         return Ok((board, certificate));
     };

@@ -311,6 +311,8 @@ fn what_is_declared_is_read_and_checked() {
     assert_eq!(dataset.certificate.unwrap().scale_ppm_sd, Some(20.0));
     assert_eq!(dataset.recording.unwrap().name.as_deref(), Some("line 3"));
 
+    assert_eq!(dataset.board.square_mm, 10.0);
+
     let with = |from: &str, to: &str| refused(&declared.replace(from, to));
     assert_says(&with("20.0", "-1.0"), &["scale_ppm_sd = -1"]);
     assert_says(&with("2026-11-30", "30.11."), &["date = \"30.11.\""]);
