@@ -24,7 +24,7 @@ use calib_judge::held_out::folds_wanted;
 use calib_judge::plausibility::Sheet;
 use calib_judge::unexpected_optics::unexpected_optics;
 use calib_judge::verdict::Thresholds;
-use calib_judge::{BoardErrors, Folds, Task, held_out};
+use calib_judge::{Declared, Folds, Task, held_out};
 use calib_rays::field::RayTable;
 use calib_rays::progress::Progress;
 use calib_recording::dataset::Dataset;
@@ -132,12 +132,13 @@ pub fn calibrate(
     Ok(calibrated)
 }
 
-/// What the board's certificate says of its lengths.
-fn board_errors(dataset: &Dataset) -> BoardErrors {
+/// What the board's certificate and the settings say of a measurement's errors.
+fn declared(dataset: &Dataset, settings: &CalibrateSettings) -> Declared {
     let certificate = dataset.certificate;
-    BoardErrors {
+    Declared {
         scale_ppm_sd: certificate.and_then(|c| c.scale_ppm_sd),
         temperature_ppm_sd: certificate.and_then(|c| c.expansion_ppm_sd()),
+        match_noise_px: settings.match_noise_px,
     }
 }
 
@@ -168,8 +169,8 @@ pub fn calibrate_corners(
 
     // Before all that takes long: it may be that it cannot be answered.
     let task = settings.task.map(|task| {
-        let board = board_errors(dataset);
-        solution.own.expected_error(&solution.rig, &task, &board)
+        let declared = declared(dataset, settings);
+        solution.own.expected_error(&solution.rig, &task, &declared)
     });
     let task = task.transpose()?;
 

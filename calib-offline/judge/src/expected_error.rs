@@ -14,14 +14,15 @@ const COARSER: f64 = 1.4;
 /// Of a Gaussian 95 % lie within so many standard deviations.
 pub const SIGMAS_OF_95_PERCENT: f64 = 1.96;
 
-/// What is not known of the board's lengths, one standard deviation, parts per million; `None` where nobody
-/// says.
+/// What the data do not say of a measurement's errors, one standard deviation each; `None` where nobody says.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct BoardErrors {
-    /// Of its scale.
+pub struct Declared {
+    /// Of the board's scale, parts per million.
     pub scale_ppm_sd: Option<f64>,
-    /// Of the correction for its temperature.
+    /// Of the correction for the board's temperature, parts per million.
     pub temperature_ppm_sd: Option<f64>,
+    /// Of the pixels of matches, px; they count as noisy as the corners.
+    pub match_noise_px: Option<f64>,
 }
 
 /// Why there is no expected error.
@@ -145,14 +146,14 @@ pub struct Shares {
 }
 
 impl Shares {
-    fn of(variance: &LengthVariance, noise_px2: f64, board: &BoardErrors, length_mm: f64) -> Self {
+    fn of(variance: &LengthVariance, noise_px2: f64, declared: &Declared, length_mm: f64) -> Self {
         let by_ppm = |ppm: f64| ppm * 1e-6 * length_mm;
         Self {
             pixel_noise: (variance.per_px2 * noise_px2).sqrt(),
             calibration: variance.calibration_mm2.sqrt(),
-            board_scale: board.scale_ppm_sd.map(by_ppm),
+            board_scale: declared.scale_ppm_sd.map(by_ppm),
             board_shape: variance.board_shape_mm2.sqrt(),
-            temperature: board.temperature_ppm_sd.map(by_ppm),
+            temperature: declared.temperature_ppm_sd.map(by_ppm),
         }
     }
 
@@ -230,7 +231,7 @@ pub struct ExpectedError {
     pub places: usize,
     /// Lines asked for.
     pub lines: usize,
-    /// Noise of the measured pixels that was assumed, that of the corners, px.
+    /// Noise of the measured pixels that was assumed: as declared, else that of the corners, px.
     pub pixel_noise_px: f64,
 }
 
@@ -253,7 +254,7 @@ pub fn expected_error(
     estimate: &Estimate,
     rig: &Rig,
     task: &Task,
-    board: &BoardErrors,
+    declared: &Declared,
 ) -> Result<ExpectedError, TaskError> {
     if rig.cameras.len() < 2 {
         return Err(TaskError::OneCamera);
@@ -262,13 +263,15 @@ pub fn expected_error(
     let lines = lines(rig, task);
     let ends: Vec<Ends> = lines.iter().map(|line| line.ends).collect();
     let variances = estimate.length_variances(rig, &ends)?;
-    let noise_px2 = estimate.pixel_variance_px2();
+    let noise_px2 = declared
+        .match_noise_px
+        .map_or_else(|| estimate.pixel_variance_px2(), |px| px * px);
     let found: Vec<(&Line, LengthVariance, Shares)> = lines
         .iter()
         .zip(variances)
         .filter_map(|(line, variance)| {
             let variance = variance?;
-            let shares = Shares::of(&variance, noise_px2, board, task.length_mm);
+            let shares = Shares::of(&variance, noise_px2, declared, task.length_mm);
             Some((line, variance, shares))
         })
         .collect();
@@ -412,9 +415,10 @@ mod tests {
             per_px2: 0.0,
             if_independent_mm2: 0.0,
         };
-        let board = BoardErrors {
+        let board = Declared {
             scale_ppm_sd: Some(30.0),
             temperature_ppm_sd: Some(40.0),
+            match_noise_px: None,
         };
         let shares = Shares::of(&variance, 1.0, &board, 250.0);
         // 30 and 40 millionths of 250 mm, and a right triangle.
@@ -422,7 +426,7 @@ mod tests {
         assert!((shares.board_scale.unwrap() - 0.0075).abs() < 1e-15);
         assert!((shares.temperature.unwrap() - 0.01).abs() < 1e-15);
         assert!((shares.total_mm() - 0.0125).abs() < 1e-15);
-        let none = Shares::of(&variance, 1.0, &BoardErrors::default(), 250.0);
+        let none = Shares::of(&variance, 1.0, &Declared::default(), 250.0);
         assert_eq!((none.board_scale, none.temperature), (None, None));
         assert_eq!(none.total_mm(), 0.0);
     }

@@ -26,7 +26,7 @@ pub mod working_volume;
 
 pub use cause::{Cause, Code};
 pub use cross_checks::{CrossChecks, cross_check};
-pub use expected_error::{BoardErrors, ExpectedError, TaskError, expected_error};
+pub use expected_error::{Declared, ExpectedError, TaskError, expected_error};
 pub use held_out::{Folds, HeldOut, estimate_folds, held_out};
 pub use stage_axis::fit_stage_axes;
 pub use task::{Task, TaskWordsError};

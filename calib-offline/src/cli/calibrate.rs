@@ -37,7 +37,7 @@ rig's frame; NaN where there is no ray. Those of --method alternating are its ow
 With --task 'length 100 mm at 800 mm' the expected error of that measurement is part of all results: its standard
 deviation and 95 % limit from the joint covariance of both ends, RMS over places in the calibrated area at that
 distance from the first camera and seven directions at each (its u, v and optical axis, and four diagonals), and
-the worst line. Its shares add up in squares: pixel noise (as large as that of the corners), calibration, board's
+the worst line. Its shares add up in squares: pixel noise (--match-noise-px, else that of the corners), calibration, board's
 scale, shape and temperature. What [board.certificate] does not say of scale and temperature is not in it.
 
 With --json, schema calib-offline/calibrate/1; a figure that does not apply is null:

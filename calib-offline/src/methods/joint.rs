@@ -11,7 +11,7 @@ use calib_judge::held_out::Estimated;
 use calib_judge::suspects::{left_open_mm, suspects};
 use calib_judge::working_volume::span;
 use calib_judge::{
-    BoardErrors, Cause, CrossChecks, ExpectedError, Task, TaskError, cross_check, expected_error,
+    Cause, CrossChecks, Declared, ExpectedError, Task, TaskError, cross_check, expected_error,
 };
 use calib_rays::field::Rig;
 use calib_rays::progress::Progress;
@@ -95,9 +95,9 @@ impl Own for Estimate {
         &self,
         rig: &Rig,
         task: &Task,
-        board: &BoardErrors,
+        declared: &Declared,
     ) -> Result<ExpectedError, TaskError> {
-        expected_error(self, rig, task, board)
+        expected_error(self, rig, task, declared)
     }
 
     fn suspects(&self, rig: &Rig) -> Vec<Cause> {

@@ -6,7 +6,7 @@ use calib_estimate::adjust::{Observations, StopReason};
 use calib_estimate::init::screening::Finding;
 use calib_judge::half_data::Split;
 use calib_judge::known_points::{Points, measure};
-use calib_judge::{BoardErrors, Cause, CrossChecks, ExpectedError, Task, TaskError};
+use calib_judge::{Cause, CrossChecks, Declared, ExpectedError, Task, TaskError};
 use calib_rays::board::BoardShape;
 use calib_rays::field::{RayTable, Rig};
 use calib_rays::geometry::{RigidTransform, SensorSize};
@@ -92,7 +92,7 @@ pub trait Own: Debug + Send + Sync {
         &self,
         _rig: &Rig,
         _task: &Task,
-        _board: &BoardErrors,
+        _declared: &Declared,
     ) -> Result<ExpectedError, TaskError> {
         Err(TaskError::NoCovariance)
     }

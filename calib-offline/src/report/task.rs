@@ -67,7 +67,7 @@ pub fn share_rows(shares: &Shares) -> [(&'static str, String); 5] {
 /// What it is an average of, and under which assumption.
 pub fn assumed(found: &ExpectedError) -> String {
     format!(
-        "RMS over {} lines at {} places of the calibrated area; pixels as noisy as the corners ({} px); were the two \
+        "RMS over {} lines at {} places of the calibrated area; pixels with noise of {} px; were the two \
          ends independent, {} mm",
         found.lines,
         found.places,

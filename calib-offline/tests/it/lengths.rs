@@ -5,7 +5,7 @@ use crate::common::against_truth::MATCHES;
 use crate::common::standard::standard;
 use crate::common::{MANIFEST, corners_csv, dataset, project, run, with_uncertainty};
 use calib_estimate::joint::Ends;
-use calib_judge::{BoardErrors, Task, expected_error};
+use calib_judge::{Declared, Task, expected_error};
 use calib_rays::field::Rig;
 use calib_rays::geometry::PixelPoint;
 use calib_simulate::{MatchSet, OpticsKind, TrueMatch};
@@ -128,9 +128,10 @@ fn the_shares_of_a_task_add_up_in_squares() {
         length_mm: 40.0,
         distance_mm: distances[distances.len() / 2],
     };
-    let board = BoardErrors {
+    let board = Declared {
         scale_ppm_sd: Some(150.0),
         temperature_ppm_sd: None,
+        match_noise_px: None,
     };
     let expected = expected_error(&found.estimate, &rig, &task, &board).unwrap();
     println!("{expected:?}");
@@ -148,6 +149,15 @@ fn the_shares_of_a_task_add_up_in_squares() {
     assert_eq!(lines, expected.lines);
     // The errors of the two ends go together, and that helps a length shorter than the field is smooth.
     assert!(expected.if_ends_independent_mm > expected.sd_mm);
+    // Noisier matches cost their share, and no other.
+    let declared = Declared {
+        match_noise_px: Some(3.0 * expected.pixel_noise_px),
+        ..board
+    };
+    let noisier = expected_error(&found.estimate, &rig, &task, &declared).unwrap();
+    let ratio = noisier.shares_mm.pixel_noise / shares.pixel_noise;
+    assert!((ratio - 3.0).abs() < 1e-9, "{ratio}");
+    assert_eq!(noisier.shares_mm.calibration, shares.calibration);
 }
 
 /// What `calibrate --task` says of the standard recording with a manifest.

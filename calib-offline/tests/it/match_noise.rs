@@ -228,7 +228,11 @@ fn gaps_are_asked_on_request_and_refuse_what_they_do_not_say() {
         ]);
         assert!(found.stdout.contains("off by 0.1"), "{}", found.stdout);
     }
-    fs::write(path.join("l.csv"), "id_a,id_b,length_mm,limit_mm\n0,19,76,5\n").unwrap();
+    fs::write(
+        path.join("l.csv"),
+        "id_a,id_b,length_mm,limit_mm\n0,19,76,5\n",
+    )
+    .unwrap();
     let lengths = ["measure", "c.json", "m.csv", "--json", "--lengths", "l.csv"];
     let arguments = [&lengths[..], &estimate].concat();
     let object = run(path, &arguments).assert_code(0).json();
