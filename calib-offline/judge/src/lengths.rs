@@ -140,20 +140,20 @@ mod tests {
         }
     }
 
-    fn end(x: f64, variance_mm2: f64) -> Option<End> {
-        Some(End {
+    fn end(x: f64, variance_mm2: f64) -> End {
+        End {
             point_mm: Vector3::new(x, 7.0, 500.0),
             covariance_mm2: Some(Matrix3::from_diagonal(&Vector3::new(
                 variance_mm2,
                 9.0,
                 9.0,
             ))),
-        })
+        }
     }
 
     #[test]
     fn an_error_has_the_variance_of_both_ends_along_the_length_and_of_the_scale() {
-        let ends = [[end(0.0, 0.0004), end(100.01, 0.0005)]];
+        let ends = [[end(0.0, 0.0004), end(100.01, 0.0005)].map(Some)];
         let found = check(&[known(100.0, Some(0.02))], &ends, 400.0);
         let length = &found.lengths[0];
         assert!((length.error_mm.unwrap() - 0.01).abs() < 1e-12);
@@ -166,7 +166,7 @@ mod tests {
 
     #[test]
     fn a_verdict_takes_limits_and_measurements() {
-        let measured = [end(0.0, 1.0), end(100.01, 1.0)];
+        let measured = [end(0.0, 1.0), end(100.01, 1.0)].map(Some);
         let verdict = |all: &[(Option<f64>, [Option<End>; 2])]| {
             let lengths: Vec<_> = all.iter().map(|(limit, _)| known(100.0, *limit)).collect();
             let ends: Vec<_> = all.iter().map(|(_, ends)| *ends).collect();
@@ -177,7 +177,7 @@ mod tests {
             verdict(&[(Some(0.02), measured), (None, measured)]),
             Some(Grade::Pass)
         );
-        let unmeasured = (Some(0.02), [None, end(0.0, 1.0)]);
+        let unmeasured = (Some(0.02), [None, Some(end(0.0, 1.0))]);
         assert_eq!(
             verdict(&[(Some(0.02), measured), unmeasured]),
             Some(Grade::Doubtful)

@@ -102,7 +102,7 @@ pub struct MeasureArgs {
     /// Find that from the gaps of these matches; it takes 100 of them
     #[arg(long, conflicts_with_all = ["match_noise_px", "device"])]
     pub estimate_match_noise: bool,
-    /// Check known lengths between the points: a file with id_a,id_b,length_mm[,limit_mm]
+    /// Check known lengths between the points, of a file as below
     #[arg(long, value_name = "LENGTHS.csv", conflicts_with = "device")]
     pub lengths: Option<PathBuf>,
     /// Replace whatever stands in the output's place

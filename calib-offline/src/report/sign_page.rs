@@ -55,7 +55,7 @@ fn signature(calibration: &Calibration) -> Markup {
             (field("Recording", recording.name.as_ref()))
             (field("Recorded by", recording.by.as_ref()))
             (field("Recorded on", recording.date.as_ref()))
-            (field("Calibration", Some(&calibration.input_sha256)))
+            (field("Input SHA-256", Some(&calibration.input_sha256)))
             (field("Date", None))
             (field("Name", None))
             (field("Signature", None))

@@ -14,18 +14,7 @@ pub fn summary(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
     let facts = Facts::of(calibration);
     let mut lines: Vec<(&str, String)> = vec![("verdict", facts.verdict.word().to_owned())];
     lines.extend(facts.reasons.iter().map(|reason| ("", reason.clone())));
-    // What lowers the grade stands among the reasons.
-    for cause in &calibration.causes {
-        let text = match cause.grade {
-            Grade::Pass => cause.text.clone(),
-            _ => format!(
-                "{}, see above; costs {} mm",
-                cause.size,
-                short(cause.cost_mm)
-            ),
-        };
-        lines.push(("found", format!("{}: {text}", cause.code.word())));
-    }
+    lines.extend(causes(calibration));
     lines.push(("held-out error", held_out(calibration, &facts)));
     lines.extend(task::facts(calibration));
     lines.extend(task::certificate(calibration));
@@ -114,6 +103,21 @@ pub fn summary(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{name:<15} {fact}");
         text
+    })
+}
+
+/// What was found about the recording; what lowers the grade stands among the reasons.
+fn causes(calibration: &Calibration) -> impl Iterator<Item = (&'static str, String)> {
+    calibration.causes.iter().map(|cause| {
+        let text = match cause.grade {
+            Grade::Pass => cause.text.clone(),
+            _ => format!(
+                "{}, see above; costs {} mm",
+                cause.size,
+                short(cause.cost_mm)
+            ),
+        };
+        ("found", format!("{}: {text}", cause.code.word()))
     })
 }
 
