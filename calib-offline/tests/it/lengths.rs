@@ -11,6 +11,7 @@ use calib_rays::geometry::PixelPoint;
 use calib_simulate::{MatchSet, OpticsKind, TrueMatch};
 use nalgebra::Vector3;
 use serde_json::Value;
+use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
@@ -246,7 +247,7 @@ fn measured() -> tempfile::TempDir {
         ("c", [0.0, 0.0, 20.0]),
     ] {
         let [l, r] = [0, 1].map(|k| project(&calibration.rig, k, &Vector3::from(point)));
-        matches += &format!("{id},{},{},{},{}\n", l.u, l.v, r.u, r.v);
+        let _ = writeln!(matches, "{id},{},{},{},{}", l.u, l.v, r.u, r.v);
     }
     fs::write(path.join("m.csv"), matches + "off,-900,0,0,0\n").unwrap();
     folder
