@@ -146,18 +146,15 @@ pub fn read_lengths(file: &Path) -> Result<Vec<KnownLength>, LengthsError> {
         line,
         problem,
     };
-    let mut rows = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .trim(csv::Trim::All)
-        .from_reader(bytes)
-        .into_records();
-    let header = rows.next().transpose();
-    let header = header.map_err(|_| row_error(1, LengthProblem::NotText))?;
-    let header: Vec<String> = header.map_or(Vec::new(), |header| {
-        header.iter().map(str::to_owned).collect()
-    });
-    if !(header == HEADER || header == HEADER[..3]) {
+    // Line by line: no id has a line's end in it, and an empty line is none.
+    let mut rows = bytes.split(|byte| *byte == b'\n').enumerate();
+    let header = rows
+        .next()
+        .map_or(Ok(csv::StringRecord::new()), |(_, row)| fields(row));
+    let header = header.map_err(|problem| row_error(1, problem))?;
+    let columns = header.len();
+    if !(columns >= 3 && header.iter().eq(HEADER.into_iter().take(columns))) {
+        let header: Vec<&str> = header.iter().collect();
         return Err(LengthsError::Header {
             file: file.to_owned(),
             found: shortened(&header.join(",")),
@@ -165,17 +162,9 @@ pub fn read_lengths(file: &Path) -> Result<Vec<KnownLength>, LengthsError> {
     }
     let mut lengths: Vec<KnownLength> = Vec::new();
     let mut seen: BTreeMap<[String; 2], usize> = BTreeMap::new();
-    let mut last_line = 1;
-    for row in rows {
-        let row = row.map_err(|error| {
-            let line = error
-                .position()
-                .map_or(last_line + 1, |at| at.line() as usize);
-            row_error(line, LengthProblem::NotText)
-        })?;
-        let line = row.position().map_or(0, |at| at.line() as usize);
-        last_line = line;
-        let length = known_length(&row, line, header.len());
+    for (k, row) in rows.filter(|(_, row)| !row.trim_ascii().is_empty()) {
+        let line = k + 1;
+        let length = fields(row).and_then(|row| known_length(&row, line, columns));
         let length = length.map_err(|problem| row_error(line, problem))?;
         let mut ends = length.ids.clone();
         ends.sort();
@@ -191,6 +180,18 @@ pub fn read_lengths(file: &Path) -> Result<Vec<KnownLength>, LengthsError> {
         });
     }
     Ok(lengths)
+}
+
+/// The fields of a line, without the quotes that may protect them.
+fn fields(line: &[u8]) -> Result<csv::StringRecord, LengthProblem> {
+    let rows = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .trim(csv::Trim::All)
+        .from_reader(line)
+        .into_records()
+        .next();
+    rows.unwrap_or_else(|| Ok(csv::StringRecord::new()))
+        .map_err(|_| LengthProblem::NotText)
 }
 
 fn known_length(
@@ -277,6 +278,10 @@ mod tests {
             (rows("1,3,0,"), "l.csv:3: length_mm is \"0\""),
             (rows("1,3,nan,"), "l.csv:3: length_mm is \"nan\""),
             (rows("1,3,10,x"), "l.csv:3: limit_mm is \"x\""),
+            (
+                rows("\n1,3,10,\n3,1,9,"),
+                "l.csv:5: the length from \"3\" to \"1\" stands in line 4",
+            ),
             (rows("1,3,10,-1"), "l.csv:3: limit_mm is \"-1\""),
         ] {
             let error = read(&text).unwrap_err();
