@@ -33,12 +33,6 @@ pub const SMALL_TILTS: Boards = Boards {
     tilt_deg: 3.0,
     ..USUAL
 };
-/// Frontal within 2 degrees, at one distance.
-pub const ONE_DEPTH: Boards = Boards {
-    tilt_deg: 2.0,
-    depth: [1.0, 1.0],
-    ..USUAL
-};
 /// Distance of the middle board, mm: some 770 of 1280 px wide.
 pub const DISTANCE_MM: f64 = 470.0;
 const BASELINE_MM: f64 = 124.0;
