@@ -4,16 +4,22 @@
 //! that cannot be what they claim; the joint estimate adjusts everything and looks at the views
 //! once more; held-out boards and the calibration itself judge it; the record says all of it.
 
+mod again;
 mod corners;
 pub mod error;
 mod left_out;
 mod offered;
 mod parts;
 mod summary;
+mod verify;
+pub mod verify_error;
 
+pub use again::{estimate_again, names};
 pub use corners::{Corners, corners};
 pub use error::{CalibrateError, NoSuchPose};
 pub use offered::{Offered, camera_names, explained, offered};
+pub use verify::{Verified, verify};
+pub use verify_error::VerifyError;
 
 use crate::methods::{Given, Joint, Method, Own, fit_folds};
 use crate::report::Calibration;

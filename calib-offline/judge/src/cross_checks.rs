@@ -69,7 +69,7 @@ pub fn cross_check(
             }
             // Of the least, middle and largest distance.
             let distance_mm = *distances.get(1).ok_or(Skipped::NoCommonPoints)?;
-            halves.compared(rig, distance_mm)
+            halves.compared(rig, &[distance_mm])
         });
         let check = compared.map_or_else(HalfDataCheck::Skipped, HalfDataCheck::Compared);
         (split, check)

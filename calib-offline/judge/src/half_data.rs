@@ -190,16 +190,17 @@ pub fn estimate_halves(estimate: &Estimate, first: &BTreeSet<usize>) -> Result<H
 }
 
 impl Halves {
-    /// Compares the points of both halves at a distance of the whole estimate's first camera; of a
-    /// camera alone, its rays.
+    /// Compares the points of both halves at some distances of the whole estimate's first camera; of a
+    /// camera alone, its rays at the middle one.
     ///
     /// # Errors
     /// Why there is nothing to compare.
-    pub fn compared(&mut self, whole: &Rig, distance_mm: f64) -> Result<HalfData, Skipped> {
+    pub fn compared(&mut self, whole: &Rig, distances_mm: &[f64]) -> Result<HalfData, Skipped> {
         let (points, difference_rms_mm, covariance) = if whole.cameras.len() > 1 {
-            self.points(whole, distance_mm)?
+            self.points(whole, distances_mm)?
         } else {
-            self.rays(whole, distance_mm)?
+            let middle = distances_mm.get(distances_mm.len() / 2);
+            self.rays(whole, *middle.ok_or(Skipped::NoCommonPoints)?)?
         };
         let total = covariance.trace();
         let modes = total * total / covariance.norm_squared();
@@ -220,8 +221,8 @@ impl Halves {
     }
 
     /// Number of points compared, RMS of their difference, and its covariance.
-    fn points(&mut self, whole: &Rig, distance_mm: f64) -> Result<Differing, Skipped> {
-        let matches = matches_at(whole, &[distance_mm]);
+    fn points(&mut self, whole: &Rig, distances_mm: &[f64]) -> Result<Differing, Skipped> {
+        let matches = matches_at(whole, distances_mm);
         let [rig_a, rig_b] = &self.rigs;
         let compared = compare(rig_a, rig_b, &matches).ok_or(Skipped::NoCommonPoints)?;
         let covariance = self

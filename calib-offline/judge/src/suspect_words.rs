@@ -21,6 +21,13 @@ pub(crate) fn told(found: &Explanation, estimate: &Estimate, names: &[String]) -
         let name = names.get(camera_idx).map_or("", String::as_str);
         format!("camera {name}")
     };
+    let beside = |camera_idx: usize| {
+        if camera_idx == 0 {
+            "the others".to_owned()
+        } else {
+            name(0)
+        }
+    };
     let who = |camera_idx: Option<usize>| camera_idx.map_or_else(|| "all cameras".to_owned(), name);
     let at = |k: usize| found.values.get(k).copied().unwrap_or(0.0);
     let sd = |k: usize| found.sd.get(k).copied().unwrap_or(0.0);
@@ -57,14 +64,14 @@ pub(crate) fn told(found: &Explanation, estimate: &Estimate, names: &[String]) -
         Suspect::Turned { camera_idx } => Told {
             code: Code::CameraMoved,
             size: format!("{:.4} degrees", degrees(0)),
-            what: format!("{} turned against {}", name(camera_idx), name(0)),
+            what: format!("{} turned against {}", name(camera_idx), beside(camera_idx)),
         },
         Suspect::Moved { camera_idx } => {
             let moved_mm = Vector3::new(at(3), at(4), at(5)).norm();
             Told {
                 code: Code::CameraMoved,
                 size: format!("{:.4} degrees and {moved_mm:.3} mm", degrees(0)),
-                what: format!("{} moved against {}", name(camera_idx), name(0)),
+                what: format!("{} moved against {}", name(camera_idx), beside(camera_idx)),
             }
         }
         Suspect::Baseline { camera_idx } => {

@@ -11,7 +11,7 @@ use calib_rays::field::Rig;
 
 /// A fault costs the verdict if it moves points by more than so many times what the calibration leaves
 /// open anyway: below, another recording would differ by as much.
-const COSTLY: f64 = 2.0;
+pub(crate) const COSTLY: f64 = 2.0;
 
 /// Causes that the residuals of an estimate show, most important first. `rig` is that of the estimate.
 ///
@@ -72,7 +72,7 @@ fn cause(
 ) -> Cause {
     let since_pose = match &found.since {
         Since::Before(idx) => estimate.observations.poses.get(*idx).copied(),
-        Since::In(_) | Since::Always => None,
+        Since::From(_) | Since::In(_) | Since::Always => None,
     };
     let Told { code, size, what } = told(found, estimate, names);
     let when = match &found.since {
@@ -84,7 +84,7 @@ fn cause(
             let numbers: Vec<String> = numbers.map(usize::to_string).collect();
             format!(" in poses {}", numbers.join(", "))
         }
-        Since::Always => String::new(),
+        Since::From(_) | Since::Always => String::new(),
     };
     Cause {
         code,

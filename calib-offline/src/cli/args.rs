@@ -3,7 +3,7 @@
 use super::settings::CommonArgs;
 use super::{
     calibrate, compare, demo, detect, device, evaluate, export, flash, inspect, measure, methods,
-    pack, simulate,
+    pack, simulate, verify,
 };
 use clap::{Parser, Subcommand};
 
@@ -52,8 +52,7 @@ pub struct Cli {
 pub enum Verb {
     /// Calibrate from a dataset: calibration.json, rig.rays and report.html
     Calibrate(calibrate::CalibrateArgs),
-    /// Compare two calibrations: not yet
-    #[command(hide = true)]
+    /// Compare two calibrations of one rig: their difference, beside the predicted one
     Compare(compare::CompareArgs),
     /// Run the whole chain on the data that comes with the program
     Demo(demo::DemoArgs),
@@ -78,4 +77,6 @@ pub enum Verb {
     /// Make a dataset with known truth
     #[command(before_help = SIMULATE_EXAMPLE, after_help = SIMULATE_FORMATS)]
     Simulate(simulate::SimulateArgs),
+    /// Say whether an old calibration still holds, by a few new poses, and what changed
+    Verify(verify::VerifyArgs),
 }

@@ -5,7 +5,7 @@ use crate::compare::CompareError;
 use crate::compare::publication::ExperimentError;
 use crate::demo::DemoError;
 use crate::device::DeviceError;
-use crate::pipeline::CalibrateError;
+use crate::pipeline::{CalibrateError, VerifyError};
 use crate::report::store::CalibrationError;
 use calib_blob::export::ExportError;
 use calib_blob::matches::{LengthsError, MatchesError, NoiseError};
@@ -41,6 +41,9 @@ pub enum Error {
     /// A calibration that was read.
     #[error("the calibration cannot be used")]
     Calibration(#[from] CalibrationError),
+    /// A calibration that was to be held against a dataset.
+    #[error("the calibration cannot be verified")]
+    Verify(#[from] VerifyError),
     /// A blob that was read.
     #[error("the blob cannot be used")]
     Blob(#[from] BlobError),
@@ -154,6 +157,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         let is_undetermined = match self {
             Self::Calibrate(error) => error.is_undetermined(),
+            Self::Verify(error) => error.is_undetermined(),
             Self::Target(error) => matches!(error, TargetError::AllRefused { .. }),
             Self::Pack(error) => matches!(error, PackError::NothingCalibrated { .. }),
             Self::Noise(error) => !matches!(error, NoiseError::NothingPredicted),
@@ -176,6 +180,7 @@ impl Remedy for Error {
             Self::Target(error) => error.remedy(),
             Self::Simulate(error) => error.remedy(),
             Self::Calibration(error) => error.remedy(),
+            Self::Verify(error) => error.remedy(),
             Self::Blob(error) => error.remedy(),
             Self::Matches(error) => error.remedy(),
             Self::Noise(error) => error.remedy(),

@@ -33,6 +33,7 @@ mod run;
 pub mod settings;
 pub mod simulate;
 pub mod usage_error;
+pub mod verify;
 
 pub use outcome::Outcome;
 pub use run::main;

@@ -7,7 +7,7 @@ use super::output::Console;
 use super::settings::Settings;
 use super::{
     calibrate, compare, demo, device, evaluate, export, failure, flash, inspect, measure, methods,
-    pack, recording,
+    pack, recording, verify,
 };
 use clap::Parser;
 use std::process::ExitCode;
@@ -35,7 +35,7 @@ pub fn main() -> ExitCode {
 fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
     match verb {
         Verb::Calibrate(args) => calibrate::run(args, console, &crate::pipeline::calibrate),
-        Verb::Compare(args) => compare::run(args),
+        Verb::Compare(args) => compare::run(args, console),
         Verb::Demo(args) => demo::run(args, console),
         Verb::Detect(args) => recording::detect(args, console),
         Verb::Device(args) => device::run(args, console),
@@ -47,5 +47,6 @@ fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
         Verb::Methods(args) => methods::run(args, console),
         Verb::Pack(args) => pack::run(args, console),
         Verb::Simulate(args) => recording::simulate(args, console),
+        Verb::Verify(args) => verify::run(args, console),
     }
 }

@@ -57,8 +57,7 @@ pub enum UsageError {
     },
     /// What `compare` did is done by `methods`.
     #[error(
-        "compare is for two calibrations, and this version cannot compare them yet; methods are compared on \
-         one dataset by calib-offline methods"
+        "compare is for two calibrations; methods are compared on one dataset by calib-offline methods"
     )]
     CompareIsMethods,
     /// A measurement that nobody can read.
@@ -67,6 +66,23 @@ pub enum UsageError {
     /// Lengths between matches that pass by once.
     #[error("--lengths: the matches come from standard input, and are read twice")]
     LengthsOfStream,
+    /// A blob where a calibration is needed.
+    #[error("{}: is a blob, and does not hold the corners that it was made from", path.display())]
+    BlobWithoutCorners {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Two calibrations of different cameras.
+    #[error("the calibrations have different cameras: {} and {}", first.join(", "), second.join(", "))]
+    OtherCameras {
+        /// The first one's, with their sizes.
+        first: Vec<String>,
+        /// The second one's.
+        second: Vec<String>,
+    },
+    /// Two calibrations without a place in common.
+    #[error("the calibrations have no calibrated pixels in common that see the same points")]
+    NothingInCommon,
     /// The input would be replaced by the output.
     #[error("{}: is what the command reads", path.display())]
     OutputIsInput {
@@ -93,7 +109,16 @@ impl Remedy for UsageError {
             Self::NotPacked { .. } => {
                 "pack it first: calib-offline pack calibration.json -o rig.rays"
             }
-            Self::CompareIsMethods => "calib-offline methods DATASET, with the same options",
+            Self::CompareIsMethods => {
+                "calib-offline methods DATASET, with the same options, or calib-offline compare A.json B.json"
+            }
+            Self::BlobWithoutCorners { .. } => {
+                "give the calibration.json that the blob was packed from"
+            }
+            Self::OtherCameras { .. } => {
+                "compare calibrations of one rig, with the same names and image sizes"
+            }
+            Self::NothingInCommon => "look at both with calib-offline inspect",
             Self::OutputIsInput { .. } => "choose another place with -o",
         };
         Some(text.to_owned())

@@ -86,6 +86,7 @@ fn every_help_starts_with_an_example() {
         "methods",
         "pack",
         "simulate",
+        "verify",
     ] {
         for arguments in [[verb, "--help"], ["help", verb], [verb, "-h"]] {
             let help = run(folder.path(), &arguments);

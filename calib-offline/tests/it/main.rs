@@ -21,6 +21,7 @@ mod schemas;
 mod starting_points;
 mod target_command;
 mod uncertainty;
+mod verify;
 #[path = "../../benches/common/weak_rigs.rs"]
 mod weak_rigs;
 mod what_next;

@@ -61,6 +61,9 @@ fn from_a_recording_to_points() {
         let never = if kind == "dataset" { &never[..] } else { &[] };
         assert_documented("inspect", &schema, &[json(path, &["inspect", file])], never);
     }
+    let compare = ["compare", "out/calibration.json", "out/calibration.json"];
+    let compared = json(path, &compare);
+    assert_documented("compare", "calib-offline/compare/2", &[compared], &[]);
     let packed = json(path, &["pack", "out/calibration.json", "-o", "new.rays"]);
     assert_documented("pack", "calib-offline/pack/2", &[packed], &[]);
     let export = ["export", "new.rays", "-o", "rig.c", "--format", "c"];

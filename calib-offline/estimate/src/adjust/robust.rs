@@ -16,7 +16,7 @@ const CANDIDATES: [f64; 6] = [3.0, 4.0, 6.0, 10.0, 20.0, 1000.0];
 const REJECT_BEYOND_SIGMA: f64 = 8.0;
 
 /// Logarithm of the density of outliers, 1/px^2: anywhere on a megapixel.
-const LN_OUTLIER_DENSITY: f64 = -13.8;
+pub const LN_OUTLIER_DENSITY: f64 = -13.8;
 
 /// The distribution of residual vectors: `p(r) ~ (1 + |r|^2 / (nu v))^(-(nu + 2) / 2)`.
 #[derive(Debug, Clone, Copy, PartialEq)]

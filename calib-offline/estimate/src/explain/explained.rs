@@ -1,7 +1,7 @@
 //! A suspicion that holds: its numbers, and the estimate with it.
 
 use super::bayes::{Judged, judge};
-use super::effects::{COUNT, shifts};
+use super::effects::shifts;
 use super::scores::Scores;
 use super::suspicion::{Since, Suspect, Suspicion};
 use crate::adjust::Observations;
@@ -116,9 +116,19 @@ pub(super) fn fitted(
     start: &Explained,
     suspicion: &Suspicion,
 ) -> Option<(Explanation, Explained)> {
-    let mut observations = start.observations.clone();
-    let mut fit = start.candidate.fit.clone();
-    let mut at = DVector::zeros(suspicion.numbers.len());
+    let at = DVector::zeros(suspicion.numbers.len());
+    let fit = start.candidate.fit.clone();
+    fitted_from(rival, fit, start.observations.clone(), suspicion, at)
+}
+
+/// [`fitted`] from numbers (in units) that the observations are corrected by already.
+pub(super) fn fitted_from(
+    rival: f64,
+    mut fit: Fit,
+    mut observations: Observations,
+    suspicion: &Suspicion,
+    mut at: DVector<f64>,
+) -> Option<(Explanation, Explained)> {
     for _ in 0..REFITS {
         let judged = judged(&mut fit, &observations, suspicion, &at)?;
         let change = &judged.mean - &at;
@@ -135,9 +145,7 @@ pub(super) fn fitted(
             break;
         }
     }
-    fit.smoothness = Smoothness::new(&fit.model);
-    let mut candidate = Candidate::settle(fit, f64::NEG_INFINITY, &observations).ok()?;
-    candidate = Candidate::settle(candidate.fit, f64::NEG_INFINITY, &observations).ok()?;
+    let mut candidate = settled_anew(fit, &observations)?;
     let last = judged(&mut candidate.fit, &observations, suspicion, &at)?;
     let Judged {
         prior_sd, occam, ..
@@ -165,6 +173,13 @@ pub(super) fn fitted(
         .then_some((explanation, explained))
 }
 
+/// A fit with smoothness found anew.
+pub(super) fn settled_anew(mut fit: Fit, observations: &Observations) -> Option<Candidate> {
+    fit.smoothness = Smoothness::new(&fit.model);
+    let once = Candidate::settle(fit, f64::NEG_INFINITY, observations).ok()?;
+    Candidate::settle(once.fit, f64::NEG_INFINITY, observations).ok()
+}
+
 fn judged(
     fit: &mut Fit,
     observations: &Observations,
@@ -176,20 +191,15 @@ fn judged(
 }
 
 /// The pixels without what the numbers of a suspicion, in units, do to them.
-fn corrected(
+pub(super) fn corrected(
     observations: &Observations,
     fit: &Fit,
     suspicion: &Suspicion,
     numbers: &DVector<f64>,
 ) -> Observations {
-    let mut sizes = vec![[0.0; COUNT]; observations.views.len()];
-    for ((number, unit), size) in suspicion.numbers.iter().zip(&suspicion.units).zip(numbers) {
-        for (place, share) in number {
-            sizes[place / COUNT][place % COUNT] += share * unit * size;
-        }
-    }
     let mut corrected = observations.clone();
-    for (view_idx, (view, sizes)) in corrected.views.iter_mut().zip(&sizes).enumerate() {
+    for (view_idx, view) in corrected.views.iter_mut().enumerate() {
+        let sizes = suspicion.sizes(view_idx, numbers.as_slice());
         if sizes.iter().all(|size| *size == 0.0) {
             continue;
         }
@@ -200,7 +210,7 @@ fn corrected(
                 .iter()
                 .flatten()
                 .zip(sizes)
-                .map(|(by, size)| by * *size)
+                .map(|(by, size)| by * size)
                 .sum();
             corner.pixel.u -= shift.x;
             corner.pixel.v -= shift.y;

@@ -20,16 +20,16 @@ use rayon::prelude::*;
 /// Raftery (1995). It is an accusation, and not one more number of a model.
 pub const NEEDED: f64 = 10.0;
 /// Share of an explanation's gain that its being linear may leave for others.
-const LEFT_BY_LINEARITY: f64 = 1e-3;
+pub(super) const LEFT_BY_LINEARITY: f64 = 1e-3;
 /// Explanations at most: what is left then is small, or is none of these.
 const MOST: usize = 3;
 /// Suspicions that are fitted in full, of different kinds.
 const FITTED: usize = 7;
-const SHIFT: [Effect; 2] = [ShiftU, ShiftV];
-const TURN: [Effect; 3] = [TurnX, TurnY, TurnZ];
-const MOVE: [Effect; 3] = [MoveX, MoveY, MoveZ];
-const TURN_AND_MOVE: [Effect; 6] = [TurnX, TurnY, TurnZ, MoveX, MoveY, MoveZ];
-const SHAPE: [Effect; 3] = [Shape0, Shape1, Shape2];
+pub(super) const SHIFT: [Effect; 2] = [ShiftU, ShiftV];
+pub(super) const TURN: [Effect; 3] = [TurnX, TurnY, TurnZ];
+pub(super) const MOVE: [Effect; 3] = [MoveX, MoveY, MoveZ];
+pub(super) const TURN_AND_MOVE: [Effect; 6] = [TurnX, TurnY, TurnZ, MoveX, MoveY, MoveZ];
+pub(super) const SHAPE: [Effect; 3] = [Shape0, Shape1, Shape2];
 
 /// What explains the residuals of an estimate, most important first: each with the estimate that has it
 /// and those before it, on the data as they would have been at the end of the recording.
@@ -67,7 +67,7 @@ pub fn explain(estimate: &Estimate) -> Vec<(Explanation, Estimate)> {
 }
 
 /// Share of the corners that counts as independent, but for what a fault makes them err alike.
-fn detrended_share(estimate: &Estimate) -> f64 {
+pub(super) fn detrended_share(estimate: &Estimate) -> f64 {
     let Estimate {
         residuals,
         observations,

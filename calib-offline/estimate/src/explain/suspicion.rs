@@ -49,7 +49,8 @@ pub enum Suspect {
     RollingShutter,
 }
 
-/// Poses by their indices in which things were otherwise than at the end.
+/// Poses by their indices in which things are otherwise than in the rest: than at the end, unless it
+/// says so.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Since {
@@ -57,6 +58,8 @@ pub enum Since {
     Always,
     /// All before this index.
     Before(usize),
+    /// All from this index on: told as what is otherwise in them.
+    From(usize),
     /// These, rising.
     In(Vec<usize>),
 }
@@ -67,6 +70,7 @@ impl Since {
         match self {
             Self::Always => true,
             Self::Before(end) => pose_idx < *end,
+            Self::From(start) => pose_idx >= *start,
             Self::In(poses) => poses.binary_search(&pose_idx).is_ok(),
         }
     }
@@ -101,7 +105,10 @@ impl Suspicion {
         effects: &[Effect],
     ) -> Self {
         // What was otherwise before is told as the change since then.
-        let share = if since == Since::Always { 1.0 } else { -1.0 };
+        let share = match since {
+            Since::Always | Since::From(_) => 1.0,
+            Since::Before(_) | Since::In(_) => -1.0,
+        };
         let views: Vec<usize> = of_camera(observations, cameras)
             .filter(|view| since.holds(observations.views[*view].pose_idx))
             .collect();
@@ -178,6 +185,33 @@ impl Suspicion {
             numbers,
             alternatives: 1.0,
         }
+    }
+
+    /// The same suspicion of some poses only.
+    pub fn only(mut self, observations: &Observations, since: Since) -> Self {
+        let is_meant = |number: &Number| {
+            let views = number.iter().map(|(place, _)| place / COUNT);
+            let mut poses = views.map(|view| observations.views[view].pose_idx);
+            poses.all(|pose| since.holds(pose))
+        };
+        let kept: Vec<bool> = self.numbers.iter().map(is_meant).collect();
+        let mut keep = kept.iter();
+        self.numbers.retain(|_| keep.next() == Some(&true));
+        let mut keep = kept.iter();
+        self.units.retain(|_| keep.next() == Some(&true));
+        self.since = since;
+        self
+    }
+
+    /// What numbers (in units) do to a view: the size of each effect, as [`super::effects::Effect::unit`] has it.
+    pub fn sizes(&self, view_idx: usize, numbers: &[f64]) -> [f64; COUNT] {
+        let mut sizes = [0.0; COUNT];
+        for ((number, unit), size) in self.numbers.iter().zip(&self.units).zip(numbers) {
+            for (place, share) in number.iter().filter(|(place, _)| place / COUNT == view_idx) {
+                sizes[place % COUNT] += share * unit * size;
+            }
+        }
+        sizes
     }
 
     /// A change of the distance between a camera and the first one, along the line between them

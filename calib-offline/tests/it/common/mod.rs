@@ -239,7 +239,16 @@ height = 480
 
 /// The corners of so many poses, seen by both cameras.
 pub fn corners_csv(pose_count: usize) -> String {
-    let rig = rig();
+    noisy_corners_csv(&rig(), pose_count, |_| 0.0)
+}
+
+/// The same of a rig, each coordinate with an error by its number, px.
+pub fn noisy_corners_csv(rig: &Rig, pose_count: usize, error_px: impl Fn(u64) -> f64) -> String {
+    let mut count = 0;
+    let mut error = || {
+        count += 1;
+        error_px(count)
+    };
     let mut text = String::from("camera,pose,row,col,u,v\n");
     for pose in 0..pose_count {
         let tilt = 0.25 * (pose as f64 - 2.0);
@@ -251,9 +260,9 @@ pub fn corners_csv(pose_count: usize) -> String {
             for row in 0..BOARD.rows {
                 for col in 0..BOARD.cols {
                     let point = rig_from_board.point(&BOARD.corner_in_board(row, col));
-                    let pixel = project(&rig, camera_idx, &point);
-                    let name = &camera.name;
-                    text += &format!("{name},{pose},{row},{col},{},{}\n", pixel.u, pixel.v);
+                    let pixel = project(rig, camera_idx, &point);
+                    let (name, u, v) = (&camera.name, pixel.u + error(), pixel.v + error());
+                    text += &format!("{name},{pose},{row},{col},{u},{v}\n");
                 }
             }
         }
