@@ -18,7 +18,12 @@ const KINDS_OF_BOARDS: u64 = 3;
 fn observed(session: &Session, poses: usize) -> Observations {
     let mut views = session.views();
     views.retain(|view| view.pose < poses);
-    let sensors = session.scene.cameras.iter().map(|c| c.sensor()).collect();
+    let sensors = session
+        .scene
+        .cameras
+        .iter()
+        .map(calib_simulate::CameraOptics::sensor)
+        .collect();
     Observations::new(session.scene.settings.board, sensors, &views)
 }
 
@@ -221,7 +226,7 @@ fn one_board_in_a_corner_of_the_image_is_too_little() {
 #[test]
 fn a_board_that_became_longer_one_way_is_not_the_rig() {
     let found = checked(Rig::Plain, 2, |_, take| {
-        take.stretch_and_shear = [1.002, 0.0]
+        take.stretch_and_shear = [1.002, 0.0];
     });
     assert_eq!(found.verdict, Grade::Doubtful, "{:?}", found.reasons);
     assert_eq!(found.cause, Some(Code::SquareScaleAxis));
