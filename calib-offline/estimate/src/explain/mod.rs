@@ -4,7 +4,7 @@
 //! (METHOD 2.8).
 //!
 //! [`effects`] are what a unit of each such number does to the corners of one view; a
-//! [`suspicion`] joins effects of many views under common numbers; [`scores`] judges all suspicions
+//! [`suspicion`] joins effects of many views under common numbers; `scores` judges all suspicions
 //! from one linearization; [`search`](mod@search) fits those ahead in full and takes the best.
 //! [`change`] looks between an old recording and a few new poses, starting from the old rig as it is (`held`).
 

@@ -3,7 +3,7 @@
 //! and for an error.
 //!
 //! [`Sheet::of`] is all of it. What a board's labels and pixels could have been meant as is in
-//! [`reading`]; a camera's views are tried against another's in [`whole_camera`] and [`single_views`].
+//! `reading`; a camera's views are tried against another's in `whole_camera` and `single_views`.
 
 mod agreement;
 mod corner_noise;
