@@ -92,6 +92,8 @@ pub struct Figures {
     pub suspect_views: (usize, usize),
     /// Poses used.
     pub pose_count: usize,
+    /// Whether the rays of every camera meet in a point.
+    pub is_central: bool,
     /// Whether the adjustment came to rest.
     pub settled: bool,
 }
@@ -110,7 +112,7 @@ pub fn judge(figures: &Figures, thresholds: &Thresholds) -> Verdict {
     }
     reasons.extend(figures.neighbors_mm.map(|mm| neighbors(mm, thresholds)));
     let halves = figures.halves.iter();
-    reasons.extend(halves.map(|(split, half)| half_data(*split, half)));
+    reasons.extend(halves.map(|(split, half)| half_data(*split, half, figures.is_central)));
     reasons.push(rejected(figures, thresholds));
     let (suspect, views) = figures.suspect_views;
     if suspect as f64 > thresholds.suspect_views * views as f64 {
@@ -189,9 +191,17 @@ fn like_with_like(
     ];
     for (kind, ratio) in kinds {
         let Some(found) = ratio else { continue };
+        // Boards at the edge of those learned from have more than an average share of what is open: what is
+        // more than chance must cost as well.
+        let excess_px = (found.rms_px.powi(2) - found.beside_px.powi(2))
+            .max(0.0)
+            .sqrt();
+        let costs = figures
+            .left_open_mm
+            .is_none_or(|open| excess_px * figures.mm_per_px > thresholds.disagreement * open);
         let grade = if !(found.ratio <= thresholds.held_out_ratio) {
             Grade::Fail
-        } else if found.is_unlikely() {
+        } else if found.is_unlikely() && (costs || found.ratio < 1.0) {
             Grade::Doubtful
         } else {
             Grade::Pass
@@ -241,7 +251,8 @@ fn neighbors((found_mm, noise_mm): (f64, f64), thresholds: &Thresholds) -> Reaso
     (above(ratio, thresholds.neighbor_ratio), text)
 }
 
-fn half_data(split: Split, half: &HalfData) -> Reason {
+/// Half of a recording in time holds no field without a center: its prediction is too small (METHOD 9.5, 10).
+fn half_data(split: Split, half: &HalfData, is_central: bool) -> Reason {
     let [_, high] = half.ratio_by_chance;
     let figures = format!(
         "{}: calibrations differ by {:.4} mm RMS, {:.2} of the predicted, up to {high:.2} by chance",
@@ -249,9 +260,10 @@ fn half_data(split: Split, half: &HalfData) -> Reason {
         half.difference_rms_mm,
         half.ratio
     );
-    if half.is_larger() {
+    let is_held = is_central || split == Split::InTurn;
+    if half.is_larger() && is_held {
         (Grade::Doubtful, figures)
-    } else if half.shows_nothing() {
+    } else if half.shows_nothing() || !is_held {
         (Grade::Pass, format!("{figures}, which shows nothing"))
     } else {
         (Grade::Pass, figures)
@@ -308,6 +320,7 @@ mod tests {
             corners: (5000, 10),
             suspect_views: (1, 68),
             pose_count: 34,
+            is_central: true,
             settled: true,
         }
     }

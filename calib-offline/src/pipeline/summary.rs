@@ -80,6 +80,7 @@ fn figures(parts: &Parts, summary: &EstimateRecord) -> Figures {
         corners: (summary.corners_used, summary.corners_rejected),
         suspect_views: (solution.findings.len(), parts.observations.views.len()),
         pose_count: solution.pose_count(),
+        is_central: rig.cameras.iter().all(|camera| camera.field.is_central()),
         settled: solution.settled,
     }
 }
