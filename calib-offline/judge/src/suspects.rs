@@ -72,20 +72,10 @@ fn cause(
 ) -> Cause {
     let since_pose = match &found.since {
         Since::Before(idx) => estimate.observations.poses.get(*idx).copied(),
-        Since::From(_) | Since::In(_) | Since::Always => None,
+        Since::From(_) | Since::Always => None,
     };
     let Told { code, size, what } = told(found, estimate, names);
-    let when = match &found.since {
-        Since::Before(_) => since_pose.map_or(String::new(), |pose| format!(" since pose {pose}")),
-        Since::In(poses) => {
-            let numbers = poses
-                .iter()
-                .filter_map(|idx| estimate.observations.poses.get(*idx));
-            let numbers: Vec<String> = numbers.map(usize::to_string).collect();
-            format!(" in poses {}", numbers.join(", "))
-        }
-        Since::From(_) | Since::Always => String::new(),
-    };
+    let when = since_pose.map_or(String::new(), |pose| format!(" since pose {pose}"));
     Cause {
         code,
         since_pose,

@@ -60,8 +60,6 @@ pub enum Since {
     Before(usize),
     /// All from this index on: told as what is otherwise in them.
     From(usize),
-    /// These, rising.
-    In(Vec<usize>),
 }
 
 impl Since {
@@ -71,7 +69,6 @@ impl Since {
             Self::Always => true,
             Self::Before(end) => pose_idx < *end,
             Self::From(start) => pose_idx >= *start,
-            Self::In(poses) => poses.binary_search(&pose_idx).is_ok(),
         }
     }
 }
@@ -107,7 +104,7 @@ impl Suspicion {
         // What was otherwise before is told as the change since then.
         let share = match since {
             Since::Always | Since::From(_) => 1.0,
-            Since::Before(_) | Since::In(_) => -1.0,
+            Since::Before(_) => -1.0,
         };
         let views: Vec<usize> = of_camera(observations, cameras)
             .filter(|view| since.holds(observations.views[*view].pose_idx))
