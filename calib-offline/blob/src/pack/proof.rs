@@ -125,6 +125,15 @@ fn strided(extent: u32, stride: usize) -> impl Iterator<Item = u32> {
 }
 
 impl Proof {
+    /// Of a table that the runtime refuses: no pixel has a ray.
+    pub fn refused() -> Self {
+        Self {
+            worst_error_px: f64::INFINITY,
+            worst_error_mm: f64::INFINITY,
+            ..Self::empty()
+        }
+    }
+
     fn empty() -> Self {
         Self {
             worst_error_px: 0.0,

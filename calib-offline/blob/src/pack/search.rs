@@ -9,8 +9,8 @@ use super::table::Table;
 use super::{AlignedBytes, PackError, patches};
 use calib_rays::field::CalibratedCamera;
 use calib_rays::field::spline::SplineGrid;
-use ray_runtime::RayBlob;
 use ray_runtime::format::{Encoding, Form};
+use ray_runtime::{OpenError, RayBlob};
 use std::iter;
 
 /// A camera's table, and what else was tried.
@@ -266,7 +266,8 @@ impl<'a> Search<'a> {
 /// this many bounds: local bumps may stay until a grid is fine enough for them.
 const MOST_HOPELESS: f64 = 20.0;
 
-/// The worst error of a sample of the pixels, through the runtime.
+/// The worst error of a sample of the pixels, through the runtime; infinite if it refuses the table's numbers:
+/// where a small part of the sensor is calibrated, a polynomial of high degree over all of it takes huge coefficients.
 fn prove_sample(
     camera: &CalibratedCamera,
     settings: &PackSettings,
@@ -282,7 +283,13 @@ fn prove_sample(
         match_noise: None,
     };
     let bytes = AlignedBytes::from(parts.encode_cameras(&[(camera, table)])?.as_slice());
-    let blob = RayBlob::open(&bytes)?;
+    let blob = match RayBlob::open(&bytes) {
+        Err(OpenError::BadNumber {
+            table: ray_runtime::Table::Grid,
+            ..
+        }) => return Ok(Proof::refused()),
+        opened => opened?,
+    };
     let sensor = camera.field.sensor;
     // Odd, so that the sample meets every phase of a grid with an even cell size.
     let stride = (sensor.width.max(sensor.height) as usize / SAMPLE_ALONG_LONGER_SIDE) | 1;

@@ -203,6 +203,26 @@ fn local_bumps_are_packed_on_their_own_grid() {
     assert!(smaller.clone().all(|t| t.error_px > 0.01), "{tried:?}");
 }
 
+/// A polynomial of high degree takes coefficients there that the runtime refuses; other tables hold the bound.
+#[test]
+fn a_small_calibrated_area_far_from_the_middle_is_packed() {
+    let mut camera = bumpy_camera();
+    let mask = &mut camera.coverage;
+    for (cell, covered) in mask.covered.iter_mut().enumerate() {
+        let (i, j) = (cell % mask.cells_u, cell / mask.cells_u);
+        *covered =
+            (i as f64) < 0.15 * mask.cells_u as f64 && (j as f64) < 0.15 * mask.cells_v as f64;
+    }
+    let (packed, _) = packed_alone(camera, 0.001);
+    assert!(
+        packed.tables[0]
+            .tried
+            .iter()
+            .any(|tried| tried.error_px.is_infinite())
+    );
+    assert!(packed.worst_error_px <= 0.001);
+}
+
 #[test]
 fn bytes_buy_accuracy_and_too_few_are_refused_with_the_need() {
     let cameras = || rig([smooth_camera(), port_camera()].map(on_small_sensor).into());
