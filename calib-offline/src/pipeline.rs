@@ -28,6 +28,7 @@ use calib_judge::agreement::{Whole, agreement};
 use calib_judge::half_data::splits;
 use calib_judge::held_out::folds_wanted;
 use calib_judge::plausibility::Sheet;
+use calib_judge::screened::screened;
 use calib_judge::unexpected_optics::unexpected_optics;
 use calib_judge::verdict::Thresholds;
 use calib_judge::{Declared, Folds, Task, held_out};
@@ -199,6 +200,11 @@ pub fn calibrate_corners(
     progress.end();
     let sheet = Sheet::of(dataset, &views);
     let mut causes = sheet.with_suspects(causes);
+    for left_out in screened(&solution.findings, &sheet.explained) {
+        if causes.iter().all(|cause| cause.code != left_out.code) {
+            causes.push(left_out);
+        }
+    }
     let central = checks.as_ref().map(|checks| &checks.central_model);
     causes.extend(central.and_then(|c| unexpected_optics(dataset, &solution.rig, c)));
     let whole = Whole {

@@ -13,6 +13,8 @@ pub const WEAK: [&str; 3] = [FAULTLESS.name, "few-tilts", "frontal-one-depth"];
 pub struct Arguments {
     /// Recordings of a fault.
     pub draws: u64,
+    /// Seed of the first.
+    pub first: u64,
     pub rigs: Vec<Rig>,
     /// Besides the faultless recording, which the others are held against.
     pub faults: Vec<&'static Fault>,
@@ -52,6 +54,7 @@ impl Arguments {
     pub fn read(arguments: impl Iterator<Item = String>) -> Result<Self> {
         let mut read = Self {
             draws: 1,
+            first: 1,
             rigs: Vec::new(),
             faults: Vec::new(),
             beside: None,
@@ -64,6 +67,7 @@ impl Arguments {
             let mut value = || arguments.next().ok_or(format!("{option} needs a value"));
             match option.as_str() {
                 "--draws" => read.draws = value()?.parse()?,
+                "--first" => read.first = value()?.parse()?,
                 "--threads" => read.threads = value()?.parse()?,
                 "--beside" => read.beside = Some(value()?.into()),
                 "--rig" => read.rigs.push(rig(&value()?)?),
@@ -96,7 +100,7 @@ impl Arguments {
                 };
                 let all = Poses::ALL.into_iter();
                 for poses in all.filter(|poses| only.is_none_or(|only| only == *poses)) {
-                    cases.extend((1..=self.draws).map(|seed| Case {
+                    cases.extend((self.first..self.first + self.draws).map(|seed| Case {
                         fault,
                         rig,
                         poses,

@@ -1,7 +1,7 @@
 //! What `calibrate` says of recordings with one planted fault, and what a user would then measure:
 //! the tables of `VERDICTS.md`.
 //!
-//! `cargo bench -p calib-offline --bench verdicts -- [--draws N] [--rig plain|wide|window]
+//! `cargo bench -p calib-offline --bench verdicts -- [--draws N] [--first SEED] [--rig plain|wide|window]
 //! [--fault NAME]... [--beside PATH] [--threads N] [--weak]`. Every recording goes to a folder, and a
 //! program as a user has it (today's, and another one `--beside` it) calibrates it and measures 400
 //! exact matches of the true rig, as it is at the end of the recording.

@@ -16,6 +16,7 @@ pub mod lengths;
 pub mod measured_board;
 pub mod neighbor_noise;
 pub mod plausibility;
+pub mod screened;
 pub mod stage_axis;
 mod suspect_words;
 pub mod suspects;
