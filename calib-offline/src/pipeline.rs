@@ -57,6 +57,8 @@ pub struct CalibrateSettings {
     pub match_noise_px: Option<f64>,
     /// The measurement whose error is to be predicted.
     pub task: Option<Task>,
+    /// What the program was asked for, for the record.
+    pub command: Option<String>,
 }
 
 impl Default for CalibrateSettings {
@@ -69,6 +71,7 @@ impl Default for CalibrateSettings {
             ray_tables: false,
             match_noise_px: None,
             task: None,
+            command: None,
         }
     }
 }
@@ -121,6 +124,7 @@ pub fn calibrate(
     let checked = calibrate_corners(dataset, &corners, settings, progress)?;
     let mut calibrated = Calibrated::from(checked.calibration);
     calibrated.calibration.rig.match_noise_px = settings.match_noise_px;
+    calibrated.calibration.command.clone_from(&settings.command);
     if settings.ray_tables {
         let cameras = &calibrated.calibration.rig.cameras;
         progress.begin("ray tables", cameras.len());

@@ -14,13 +14,14 @@ use calib_rays::geometry::RigidTransform;
 use calib_rays::observed::Corner;
 use nalgebra::Vector2;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Standard deviations of the intervals: 999 of 1000 cases lie within.
 pub const BY_CHANCE_SD: f64 = 3.29;
 
 /// RMS residual vectors of the same corners, px, and their ratio.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Ratio {
     /// What is judged.
     pub rms_px: f64,
@@ -40,7 +41,7 @@ impl Ratio {
 }
 
 /// The three comparisons.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Agreement {
     /// Held-out over fitted, a pose for each view.
     pub mono: Option<Ratio>,

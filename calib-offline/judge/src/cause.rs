@@ -2,12 +2,13 @@
 //! and what a later check of the calibration finds.
 
 use super::grade::Grade;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Something found about a recording or a calibration.
 ///
 /// A list of them is sorted, most likely first.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Cause {
     /// What it is.
     #[serde(rename = "cause")]
@@ -25,7 +26,9 @@ pub struct Cause {
 }
 
 /// The kinds of [`Cause`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum Code {
     /// Meters, centimeters or inches taken for millimeters.

@@ -3,10 +3,11 @@
 use super::working_volume::{Match, PointDifference, compare};
 use calib_estimate::joint::{Alternative, Choice, Estimate};
 use calib_rays::field::Rig;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The cost of a central model.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum CentralModel {
     /// Nothing: every camera is central.

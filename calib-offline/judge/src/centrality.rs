@@ -3,15 +3,17 @@
 use calib_rays::field::{CalibratedCamera, RayField};
 use calib_rays::geometry::{PixelPoint, Ray, nearest_point};
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Distances of a camera's rays from the point that is nearest to all of them.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Centrality {
     /// Whether the model is central: then the distances are 0 by choice and not by measurement.
     pub central: bool,
     /// The point with the least sum of squared distances from the rays of the calibrated area,
     /// camera frame, mm. (0, 0, 0) of a central camera.
+    #[schemars(with = "[f64; 3]")]
     pub point_in_camera_mm: Vector3<f64>,
     /// RMS distance of those rays from it, mm.
     pub rms_mm: f64,

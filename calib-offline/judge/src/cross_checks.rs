@@ -7,11 +7,12 @@ use super::working_volume::{matches_at, span};
 use calib_estimate::joint::Estimate;
 use calib_rays::field::Rig;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
 /// What the checks found.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CrossChecks {
     /// How central each camera is, in the rig's order.
     pub centrality: Vec<Centrality>,

@@ -7,6 +7,7 @@ use calib_rays::field::Rig;
 use calib_rays::geometry::PixelPoint;
 use calib_rays::remedy::Remedy;
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How much coarser than the check of the calibration the lattice of places is: about fifty.
@@ -88,7 +89,7 @@ impl Remedy for TaskError {
 
 /// How a length lies, seen from the first camera: along an axis of its image, along its optical axis, or along
 /// one of the four diagonals between the three.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Direction {
     /// Along u.
@@ -131,7 +132,7 @@ fn seven_lines() -> [(Direction, Vector3<f64>); 7] {
 }
 
 /// What makes up an error, standard deviations, mm. They are independent: their squares add up.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Shares {
     /// Noise of the measured pixels.
     pub pixel_noise: f64,
@@ -186,7 +187,7 @@ impl Shares {
 }
 
 /// What is expected of lines of one direction.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct OfDirection {
     /// Which.
     pub direction: Direction,
@@ -197,7 +198,7 @@ pub struct OfDirection {
 }
 
 /// The line that is known worst.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct WorstLine {
     /// How it lies.
     pub direction: Direction,
@@ -210,7 +211,7 @@ pub struct WorstLine {
 }
 
 /// The expected error of a measurement.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ExpectedError {
     /// What was asked for.
     #[serde(flatten)]

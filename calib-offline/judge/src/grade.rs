@@ -1,9 +1,12 @@
 //! The three grades.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Pass, doubtful or fail.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum Grade {
     /// Nothing speaks against it.

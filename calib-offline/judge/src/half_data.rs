@@ -21,6 +21,7 @@ use calib_rays::field::{RayField, Rig, transport};
 use calib_rays::geometry::PixelPoint;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
@@ -31,7 +32,7 @@ pub const MIN_POSES: usize = 10;
 const SHOWS_NOTHING: f64 = 3.0;
 
 /// How the poses are divided in two.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Split {
     /// Every other one: what changes with time is in both halves.
@@ -54,7 +55,7 @@ impl Split {
 }
 
 /// The check, or why there is none.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum HalfDataCheck {
     /// It was made.
@@ -64,7 +65,7 @@ pub enum HalfDataCheck {
 }
 
 /// Why the halves were not compared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Skipped {
     /// Nobody asked for it.
@@ -83,7 +84,7 @@ pub enum Skipped {
 }
 
 /// What two halves of the poses say of each other.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HalfData {
     /// Poses of each half.
     pub poses: [usize; 2],

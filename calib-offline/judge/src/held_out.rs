@@ -16,6 +16,7 @@ use calib_rays::observed::{Corner, MIN_POSES};
 use calib_rays::progress::Progress;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt::Display;
 
@@ -49,7 +50,7 @@ pub struct Folds {
 }
 
 /// A fold whose training poses gave no estimate.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct FailedFold {
     /// Its number, from 0.
     pub fold: usize,

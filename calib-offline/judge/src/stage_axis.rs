@@ -3,6 +3,7 @@
 
 use calib_rays::geometry::{RigidTransform, so3};
 use nalgebra::{Matrix3, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -10,15 +11,17 @@ use std::collections::BTreeMap;
 const MIN_TURN_RAD: f64 = 1e-3;
 
 /// The axis that the boards of one placement turned about, rig frame.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StageAxis {
     /// Number of the placement.
     pub placement: usize,
     /// Poses that it was found from.
     pub poses: usize,
     /// The point of the axis nearest to the boards' middle, mm.
+    #[schemars(with = "[f64; 3]")]
     pub point_mm: Vector3<f64>,
     /// Unit vector along it.
+    #[schemars(with = "[f64; 3]")]
     pub direction: Vector3<f64>,
     /// RMS over pairs of poses of the part of their turn that is not about the axis, rad.
     pub wobble_rms_rad: f64,

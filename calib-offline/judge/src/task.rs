@@ -1,11 +1,12 @@
 //! The measurement that a user means to make: `length 100 mm at 800 mm`.
 
 use calib_rays::remedy::Remedy;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 
 /// A length to be measured at a distance from the first camera.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Task {
     /// How long, mm.
     pub length_mm: f64,

@@ -4,10 +4,11 @@ use super::agreement::{Agreement, Ratio};
 use super::cause::Cause;
 pub use super::grade::Grade;
 use super::half_data::{HalfData, Split};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The judgement with its reasons.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Verdict {
     /// The grade.
     pub grade: Grade,

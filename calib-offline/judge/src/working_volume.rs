@@ -4,6 +4,7 @@ use calib_rays::field::{CoverageMask, Rig};
 use calib_rays::geometry::best_placement;
 use calib_rays::geometry::{PixelPoint, RigidTransform};
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Camera index and pixel of two sightings of one point.
@@ -75,7 +76,7 @@ pub fn span(sorted_mm: &[f64]) -> Vec<f64> {
 }
 
 /// How two rigs disagree about the points of the same matches, a rigid motion apart.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PointDifference {
     /// Points that both rigs measure.
     pub points: usize,

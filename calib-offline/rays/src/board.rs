@@ -1,6 +1,7 @@
 //! The calibration board: a flat chessboard, described by its inner corners.
 
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A chessboard of `rows` x `cols` *inner* corners.
@@ -8,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// Board frame: the first inner corner (row 0, col 0) is the origin, x runs along the columns, y
 /// along the rows, z = x cross y points away from the printed face, so that a camera looking at
 /// the face has the board's z pointing away from it. Lengths in millimeters.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BoardSpec {
     /// Inner corners along y.
     pub rows: usize,
@@ -63,7 +64,7 @@ impl BoardSpec {
 
 /// Out-of-plane shape `z(X, Y)` of a board: Legendre products over the corners' extent, x and y
 /// from -1 at the first to 1 at the last corner. A flat board has no term.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct BoardShape {
     /// Powers (i, j) and coefficient, mm.
     pub terms: Vec<(usize, usize, f64)>,

@@ -8,7 +8,7 @@ use super::scene::Scene;
 use super::settings::OutputSettings;
 use super::target::SeenMarker;
 use calib_rays::board::BoardSpec;
-use calib_rays::geometry::{PixelPoint, SensorSize};
+use calib_rays::geometry::{PixelPoint, RigidTransform, SensorSize};
 use calib_rays::observed::View;
 use serde_json::json;
 use std::fmt::Write as _;
@@ -164,6 +164,11 @@ pub(super) fn truth_table(matches: &[TrueMatch]) -> String {
     text
 }
 
+/// A pose as this version of `truth.json` has it.
+fn column_by_column(pose: &RigidTransform) -> serde_json::Value {
+    json!({ "rotation": pose.rotation, "translation_mm": pose.translation_mm })
+}
+
 /// `truth.json`.
 pub(super) fn truth(scene: &Scene, settings: &OutputSettings) -> serde_json::Value {
     let cameras: Vec<_> = scene
@@ -189,7 +194,7 @@ pub(super) fn truth(scene: &Scene, settings: &OutputSettings) -> serde_json::Val
             json!({
                 "name": scene.names[camera_idx],
                 "optics": camera,
-                "left_from_camera": scene.left_from_camera[camera_idx],
+                "left_from_camera": column_by_column(&scene.left_from_camera[camera_idx]),
                 "rays_columns": ["u", "v", "ox", "oy", "oz", "dx", "dy", "dz"],
                 "rays": rays,
             })
@@ -204,7 +209,7 @@ pub(super) fn truth(scene: &Scene, settings: &OutputSettings) -> serde_json::Val
                 "pose": pose,
                 "placement": scene.pose_placements[pose],
                 "angle_deg": scene.pose_angles_deg[pose],
-                "left_from_board": left_from_board,
+                "left_from_board": column_by_column(left_from_board),
             })
         })
         .collect();

@@ -1,6 +1,7 @@
 //! `calibrate`: a dataset to `calibration.json`, `rig.rays` and `report.html`.
 
 use super::Outcome;
+use super::asked_for::asked_for;
 use super::error::Error;
 use super::match_noise::parse;
 use super::output::Console;
@@ -176,6 +177,7 @@ pub fn run(
         ray_tables: args.ray_tables,
         match_noise_px: args.match_noise_px,
         task,
+        command: Some(command(args, &dataset)),
         ..CalibrateSettings::default()
     };
     let written = calibrate_into(&args.output, &dataset, &settings, console, estimate)?;
@@ -200,6 +202,25 @@ pub fn run(
         Grade::Fail => Outcome::VerdictFail,
         Grade::Pass | Grade::Doubtful => Outcome::Done,
     })
+}
+
+/// What was asked for, for the record.
+fn command(args: &CalibrateArgs, dataset: &Dataset) -> String {
+    let method = match args.method {
+        MethodArg::Joint => None,
+        MethodArg::Alternating => Some("alternating".to_owned()),
+    };
+    let poses: Vec<String> = args.exclude.iter().map(ToString::to_string).collect();
+    let flags = [
+        ("--method", method),
+        ("--exclude", (!poses.is_empty()).then(|| poses.join(","))),
+        (
+            "--match-noise-px",
+            args.match_noise_px.map(|px| px.to_string()),
+        ),
+        ("--task", args.task.clone()),
+    ];
+    asked_for("calibrate", &dataset.folder, &flags)
 }
 
 /// Estimates, then [`write_results`].

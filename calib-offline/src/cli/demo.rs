@@ -144,11 +144,12 @@ fn run_dataset(
     let settings = CalibrateSettings::default();
     let corners = pipeline::corners(&dataset, &settings.detect, console.progress())?;
     let Checked {
-        calibration,
+        mut calibration,
         offered,
         folds,
         ..
     } = pipeline::calibrate_corners(&dataset, &corners, &settings, console.progress())?;
+    calibration.command = Some("calib-offline demo".to_owned());
     let written = write_results(place, calibration.into(), console)?;
     console.progress().begin("measuring with the blob", 0);
     let measured = measure(folder, &written, &folds, &offered);

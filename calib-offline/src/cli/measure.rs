@@ -73,20 +73,26 @@ With --json, schema calib-offline/measure/1:
                null without --lengths; verdict: fail beyond a limit, doubtful if one was not tested, null
                without limits";
 
+/// How it is called. A flag may stand anywhere, so that which of the two files is left out with a device follows from
+/// `--device` and not from where the flags are.
+const USAGE: &str = "\
+calib-offline measure [OPTIONS] --output <POINTS.csv> <RIG> <MATCHES.csv>
+       calib-offline measure [OPTIONS] --output <POINTS.csv> --device <ADDRESS> <MATCHES.csv>";
+
 /// The arguments.
 #[derive(Debug, Args)]
-#[command(before_help = EXAMPLE, after_help = FORMATS, allow_missing_positional = true)]
+#[command(before_help = EXAMPLE, after_help = FORMATS, override_usage = USAGE)]
 pub struct MeasureArgs {
-    /// A blob (*.rays) or a calibration.json
+    /// A blob (*.rays) or a calibration.json; with --device, MATCHES.csv stands here
+    #[arg(value_name = "RIG")]
+    first: PathBuf,
+    /// The pixels that belong together; - is standard input
     #[arg(
-        value_name = "RIG",
+        value_name = "MATCHES.csv",
         required_unless_present = "device",
         conflicts_with = "device"
     )]
-    pub rig: Option<PathBuf>,
-    /// The pixels that belong together; - is standard input
-    #[arg(value_name = "MATCHES.csv")]
-    pub matches: PathBuf,
+    second: Option<PathBuf>,
     /// Where to write the points
     #[arg(short, long, value_name = "POINTS.csv")]
     pub output: PathBuf,
@@ -108,6 +114,18 @@ pub struct MeasureArgs {
     /// Replace whatever stands in the output's place
     #[arg(long)]
     pub force: bool,
+}
+
+impl MeasureArgs {
+    /// The file that measures; none where a device does.
+    fn rig(&self) -> Option<&Path> {
+        self.second.as_ref().map(|_| self.first.as_path())
+    }
+
+    /// The matches.
+    fn matches(&self) -> &Path {
+        self.second.as_ref().unwrap_or(&self.first)
+    }
 }
 
 /// What `--json` prints.
@@ -137,23 +155,23 @@ struct NoiseUsed {
 /// # Errors
 /// [`Error`], with nothing written.
 pub fn run(args: &MeasureArgs, console: &Console) -> Result<Outcome, Error> {
-    let mut inputs = vec![args.matches.as_path()];
-    inputs.extend(args.rig.as_deref());
+    let mut inputs = vec![args.matches()];
+    inputs.extend(args.rig());
     inputs.extend(args.lengths.as_deref());
     check_file(&args.output, POINTS_HEADER.as_bytes(), &inputs, args.force)?;
     // Before anything is written: there may be a mistake in it.
-    let check = |noise_px| match (&args.lengths, &args.rig) {
+    let check = |noise_px| match (&args.lengths, args.rig()) {
         (Some(lengths), Some(rig)) => {
-            check_lengths(rig, &args.matches, lengths, noise_px).map(Some)
+            check_lengths(rig, args.matches(), lengths, noise_px).map(Some)
         }
         _ => Ok(None),
     };
     let mut known_lengths = check(args.match_noise_px)?;
-    let (rig, kind, (summary, noise)) = match (&args.device, &args.rig) {
+    let (rig, kind, (summary, noise)) = match (&args.device, args.rig()) {
         (Some(address), _) => (Path::new(address), "device", measure_there(args, address)?),
         (None, Some(rig)) => {
             let (kind, measured) = measure_here(args, rig)?;
-            (rig.as_path(), kind, measured)
+            (rig, kind, measured)
         }
         (None, None) => return Err(Error::Usage(UsageError::NoDevice)),
     };
@@ -209,8 +227,9 @@ fn measure_here(args: &MeasureArgs, rig: &Path) -> Result<(&'static str, Measure
                 names(BlobSource::new(&blob, None)),
                 BlobSource::new(&blob, frame),
             )?;
-            let (mut input, noise) =
-                prepare(args, |input| noise_with_blob(&source, &args.matches, input))?;
+            let (mut input, noise) = prepare(args, |input| {
+                noise_with_blob(&source, args.matches(), input)
+            })?;
             let own_px = blob.match_noise().map(|noise| f64::from(noise.px()));
             let source = match noise.match_noise_px.and_then(in_f32) {
                 Some(noise) => source.with_noise(noise),
@@ -231,7 +250,7 @@ fn measure_here(args: &MeasureArgs, rig: &Path) -> Result<(&'static str, Measure
                     RigSource::new(own, frame),
                 )?;
                 prepare(args, |input| {
-                    noise_with_calibration(&source, &args.matches, input)
+                    noise_with_calibration(&source, args.matches(), input)
                 })?
             };
             let own = &mut calibration.rig;
@@ -300,7 +319,7 @@ fn prepare(
     input
         .read_to_end(&mut bytes)
         .map_err(|source| MatchesError::Read {
-            file: args.matches.clone(),
+            file: args.matches().to_owned(),
             source,
         })?;
     let estimate = estimate(&mut bytes.as_slice())??;
@@ -312,11 +331,11 @@ fn prepare(
 }
 
 fn open_matches(args: &MeasureArgs) -> Result<Box<dyn Read>, MatchesError> {
-    Ok(if args.matches.as_os_str() == "-" {
+    Ok(if args.matches().as_os_str() == "-" {
         Box::new(std::io::stdin().lock())
     } else {
-        let file = File::open(&args.matches).map_err(|source| MatchesError::Read {
-            file: args.matches.clone(),
+        let file = File::open(args.matches()).map_err(|source| MatchesError::Read {
+            file: args.matches().to_owned(),
             source,
         })?;
         Box::new(file)
@@ -337,7 +356,7 @@ where
     Error: From<E>,
 {
     let mut output = PendingFile::create(&args.output)?;
-    let summary = measure(&args.matches, input, &mut output).map_err(|error| match error {
+    let summary = measure(args.matches(), input, &mut output).map_err(|error| match error {
         StreamError::Matches(error) => Error::Matches(error),
         StreamError::Write(source) => Error::Write(WriteError::Io {
             path: args.output.clone(),

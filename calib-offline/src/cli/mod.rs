@@ -4,6 +4,7 @@
 //! returns an [`Outcome`]; everything shown goes through [`output::Console`].
 
 pub mod args;
+mod asked_for;
 pub mod calibrate;
 pub mod compare;
 pub mod demo;

@@ -4,12 +4,14 @@ use super::left_out::{left_out, renumbered};
 use super::parts::Parts;
 use crate::methods::solution::Solution;
 use crate::report::record::{
-    Calibration, CornerRecord, EstimateRecord, HeldOutRecord, PoseRecord, SCHEMA, StageAxis,
+    Calibration, CameraRecord, CornerRecord, EstimateRecord, HeldOutRecord, PoseRecord, SCHEMA,
+    StageAxis,
 };
 use calib_judge::neighbor_noise::neighbor_noise_mm;
 use calib_judge::verdict::{Figures, judge};
 use calib_judge::{HeldOut, fit_stage_axes};
 use calib_rays::numerics::rms;
+use calib_recording::dataset::CameraSpec;
 use calib_recording::dataset::identity::input_sha256;
 use calib_recording::dataset::stage;
 use nalgebra::Vector2;
@@ -32,11 +34,13 @@ pub fn record(parts: &Parts) -> Calibration {
     Calibration {
         schema: SCHEMA.to_string(),
         tool_version: env!("CARGO_PKG_VERSION").to_string(),
+        command: None,
         method: solution.method.to_string(),
         input_sha256: input_sha256(parts.dataset, &parts.corners.views),
         board: parts.dataset.board,
         certificate: parts.dataset.certificate,
         recording: parts.dataset.recording.clone(),
+        cameras: parts.dataset.cameras.iter().map(camera_record).collect(),
         board_shape: solution.board_shape.clone(),
         stage_axes: stage_axes(parts, &poses),
         poses,
@@ -52,6 +56,14 @@ pub fn record(parts: &Parts) -> Calibration {
         causes: parts.causes.to_vec(),
         task: parts.task.cloned(),
         verdict,
+    }
+}
+
+fn camera_record(camera: &CameraSpec) -> CameraRecord {
+    CameraRecord {
+        name: camera.name.clone(),
+        serial: camera.serial.clone(),
+        optics: camera.optics,
     }
 }
 

@@ -1,8 +1,9 @@
 //! A made-up but plausible calibration, to develop and test the report with.
 
 use super::record::{
-    BoardShape, Calibration, Certificate, ChoicesRecord, CornerRecord, EstimateRecord, Grade,
-    HeldOutRecord, LeftOut, PoseRecord, RecordingSpec, Renumbered, SCHEMA, Verdict,
+    BoardShape, Calibration, CameraRecord, Certificate, ChoicesRecord, CornerRecord,
+    EstimateRecord, ExpectedOptics, Grade, HeldOutRecord, LeftOut, PoseRecord, RecordingSpec,
+    Renumbered, SCHEMA, Verdict,
 };
 use calib_estimate::joint::{Alternative, Choice, Family, SmoothnessFound};
 use calib_judge::central_model::CentralModel;
@@ -82,9 +83,11 @@ pub fn calibration() -> Calibration {
     Calibration {
         schema: SCHEMA.to_owned(),
         tool_version: "0.1.0".to_owned(),
+        command: Some("calib-offline calibrate monday".to_owned()),
         method: "joint".to_owned(),
         input_sha256: "9f2c4e".repeat(11)[..64].to_owned(),
         board,
+        cameras: declared_cameras(),
         board_shape: BoardShape {
             terms: vec![(2, 0, 0.03), (0, 2, -0.02)],
         },
@@ -99,13 +102,7 @@ pub fn calibration() -> Calibration {
         poses,
         corners,
         left_out: left_out(),
-        renumbered: vec![Renumbered {
-            pose: 7,
-            camera: "right".to_owned(),
-            reason: "numbered from the other end of the board than in camera left; renumbered, \
-                     and used"
-                .to_owned(),
-        }],
+        renumbered: renumbered(),
         choices: Some(choices()),
         checks: Some(checks()),
         causes: Vec::new(),
@@ -271,6 +268,18 @@ fn checks() -> CrossChecks {
     }
 }
 
+fn declared_cameras() -> Vec<CameraRecord> {
+    let camera = |name: &str, serial: Option<&str>, optics| CameraRecord {
+        name: name.to_owned(),
+        serial: serial.map(str::to_owned),
+        optics,
+    };
+    vec![
+        camera("left", Some("SN-0012"), Some(ExpectedOptics::Window)),
+        camera("right", None, None),
+    ]
+}
+
 fn certificate() -> Certificate {
     Certificate {
         scale_ppm_sd: Some(20.0),
@@ -338,6 +347,16 @@ fn left_out() -> Vec<LeftOut> {
             reason: "no board found: 31 of 195 corners, the rest too blurred".to_owned(),
         },
     ]
+}
+
+fn renumbered() -> Vec<Renumbered> {
+    vec![Renumbered {
+        pose: 7,
+        camera: "right".to_owned(),
+        reason:
+            "numbered from the other end of the board than in camera left; renumbered, and used"
+                .to_owned(),
+    }]
 }
 
 fn pose_on_stage(angle_deg: f64, height_mm: f64) -> RigidTransform {

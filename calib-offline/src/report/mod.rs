@@ -9,6 +9,7 @@ pub mod left_out_page;
 pub mod plot;
 mod procedure;
 pub mod record;
+pub mod schema;
 mod sign_page;
 pub mod store;
 pub mod task;

@@ -12,23 +12,30 @@ pub use calib_rays::board::BoardShape;
 use calib_rays::board::BoardSpec;
 use calib_rays::field::Rig;
 use calib_rays::geometry::{PixelPoint, RigidTransform};
-pub use calib_recording::dataset::{Certificate, RecordingSpec};
+pub use calib_recording::dataset::{Certificate, ExpectedOptics, RecordingSpec};
 use nalgebra::Vector2;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Name and version of the format.
-pub const SCHEMA: &str = "calib-offline/calibration/1";
+/// Name and version of the format: the one written.
+pub const SCHEMA: &str = "calib-offline/calibration/2";
+/// The version before, which is read too: rotations are nine numbers, column by column.
+pub const SCHEMA_1: &str = "calib-offline/calibration/1";
 
 /// The whole result of `calibrate`.
 ///
 /// Millimeters; the center of the top-left pixel is (0, 0); `a_from_b` maps coordinates in b to
 /// coordinates in a. The rig frame is the board frame at the datum pose.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Calibration {
     /// [`SCHEMA`].
     pub schema: String,
     /// Version of the program that wrote the file.
     pub tool_version: String,
+    /// What the program was asked for, as words of a command line: the dataset by the name of its folder, without
+    /// what has no bearing on the result. `None` where a library was, and in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub command: Option<String>,
     /// `joint` or `alternating`.
     pub method: String,
     /// SHA-256 of the manifest and of the corners that went in, hex. With the tool's version it
@@ -43,6 +50,9 @@ pub struct Calibration {
     /// What the manifest says of the recording, if it does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording: Option<RecordingSpec>,
+    /// What the manifest says of each camera, in the rig's order; empty in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cameras: Vec<CameraRecord>,
     /// Out-of-plane shape found for the board.
     pub board_shape: BoardShape,
     /// The calibrated cameras.
@@ -83,8 +93,21 @@ pub struct Calibration {
     pub verdict: Verdict,
 }
 
+/// A camera as the manifest describes it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct CameraRecord {
+    /// Its name in the rig.
+    pub name: String,
+    /// Serial number, if the manifest says it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub serial: Option<String>,
+    /// What stands before it, if the manifest says it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub optics: Option<ExpectedOptics>,
+}
+
 /// One pose of the board.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PoseRecord {
     /// Its number in the dataset.
     pub pose: usize,
@@ -98,7 +121,7 @@ pub struct PoseRecord {
 }
 
 /// One corner offered to the estimate.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CornerRecord {
     /// Index into the rig's cameras.
     pub camera_idx: usize,
@@ -112,13 +135,14 @@ pub struct CornerRecord {
     pub observed: PixelPoint,
     /// Observed minus predicted, px (to first order, see `joint::residual`); zero where no ray
     /// predicts.
+    #[schemars(with = "[f64; 2]")]
     pub residual_px: Vector2<f64>,
     /// Robust weight, 0 to 1; 0 is a corner that is rejected or that no ray predicts.
     pub weight: f64,
 }
 
 /// Something that did not go into the estimate.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LeftOut {
     /// Number of the pose.
     pub pose: usize,
@@ -131,7 +155,7 @@ pub struct LeftOut {
 }
 
 /// A view whose labels were changed.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Renumbered {
     /// Number of the pose.
     pub pose: usize,
@@ -142,7 +166,7 @@ pub struct Renumbered {
 }
 
 /// How the estimate went.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EstimateRecord {
     /// Cost after each accepted step.
     pub cost_per_iteration: Vec<f64>,
@@ -160,7 +184,7 @@ pub struct EstimateRecord {
 
 /// What the estimate chose by itself, each with its evidence. "Evidence" is twice the logarithm of
 /// the probability of the data under a model; the scale is that of Kass and Raftery (1995).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ChoicesRecord {
     /// The alternatives, in the order tried.
     pub tried: Vec<Choice>,
@@ -181,7 +205,7 @@ pub struct ChoicesRecord {
 }
 
 /// How the published procedure went.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct AlternatingRecord {
     /// Spread of the networks.
     pub spread: SpreadChoice,
@@ -202,7 +226,7 @@ pub struct AlternatingRecord {
 }
 
 /// Boards the estimate never saw, measured with the rig.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HeldOutRecord {
     /// Number of folds; poses are dealt to folds in turn.
     pub folds: usize,

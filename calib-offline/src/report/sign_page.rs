@@ -1,7 +1,7 @@
 //! What stands on the printed page to sign, beside verdict and figures: the user's measurement, what is declared of
 //! the board, who recorded and when, and a line for the signature.
 
-use super::record::Calibration;
+use super::record::{Calibration, CameraRecord};
 use super::task;
 use crate::present::numbers::short;
 use maud::{Markup, html};
@@ -47,6 +47,10 @@ fn declared(calibration: &Calibration) -> Markup {
 
 fn signature(calibration: &Calibration) -> Markup {
     let recording = calibration.recording.clone().unwrap_or_default();
+    let serial =
+        |camera: &CameraRecord| Some(format!("{} {}", camera.name, camera.serial.as_ref()?));
+    let serials: Vec<String> = calibration.cameras.iter().filter_map(serial).collect();
+    let serials = (!serials.is_empty()).then(|| serials.join(", "));
     let field = |name: &str, value: Option<&String>| {
         html! { p { span.field { (name) } span.blank { @if let Some(value) = value { (value) } } } }
     };
@@ -55,6 +59,7 @@ fn signature(calibration: &Calibration) -> Markup {
             (field("Recording", recording.name.as_ref()))
             (field("Recorded by", recording.by.as_ref()))
             (field("Recorded on", recording.date.as_ref()))
+            (field("Serial numbers", serials.as_ref()))
             (field("Input SHA-256", Some(&calibration.input_sha256)))
             (field("Date", None))
             (field("Name", None))

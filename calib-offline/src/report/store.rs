@@ -2,7 +2,7 @@
 //! so that no later code meets a table of the wrong length.
 
 use super::Calibration;
-use super::record::SCHEMA;
+use super::record::{SCHEMA, SCHEMA_1};
 use calib_rays::field::polynomial::{MAX_DEGREE, term_count};
 use calib_rays::field::{CalibratedCamera, PairUncertainty, SmoothMap};
 use calib_rays::remedy::Remedy;
@@ -36,7 +36,7 @@ pub enum CalibrationError {
         message: String,
     },
     /// Another format or version.
-    #[error("{}: has the schema \"{found}\", this version reads \"{SCHEMA}\"", file.display())]
+    #[error("{}: has the schema \"{found}\", this version reads \"{SCHEMA}\" and \"{SCHEMA_1}\"", file.display())]
     Schema {
         /// The file.
         file: PathBuf,
@@ -100,13 +100,15 @@ impl Calibration {
         };
         // The schema first: of another version only this field is known to exist.
         let OnlySchema { schema } = serde_json::from_slice(bytes).map_err(json_error)?;
-        if schema != SCHEMA {
+        if ![SCHEMA, SCHEMA_1].contains(&schema.as_str()) {
             return Err(CalibrationError::Schema {
                 file: file.to_owned(),
                 found: schema.chars().take(60).collect(),
             });
         }
-        let calibration: Self = serde_json::from_slice(bytes).map_err(json_error)?;
+        let mut calibration: Self = serde_json::from_slice(bytes).map_err(json_error)?;
+        // Whatever it was read from, this is what it would be written as.
+        SCHEMA.clone_into(&mut calibration.schema);
         match calibration.contradiction() {
             None => Ok(calibration),
             Some((what, subject)) => Err(CalibrationError::Inconsistent {
@@ -261,7 +263,7 @@ mod tests {
 
     #[test]
     fn another_version_is_told_from_a_damaged_file() {
-        let error = changed(|v| v["schema"] = "calib-offline/calibration/2".into()).unwrap_err();
+        let error = changed(|v| v["schema"] = "calib-offline/calibration/3".into()).unwrap_err();
         assert!(matches!(error, CalibrationError::Schema { .. }));
         let error = Calibration::from_json(Path::new("c.json"), b"{\n  x").unwrap_err();
         assert!(error.to_string().starts_with("c.json:2: "), "{error}");

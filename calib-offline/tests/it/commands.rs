@@ -150,6 +150,54 @@ fn measure_gives_one_row_per_match_in_order() {
 }
 
 #[test]
+fn flags_may_stand_before_between_and_behind_the_files() {
+    let (folder, _) = measuring();
+    let path = folder.path();
+    let (flags, files) = (["-o", "p.csv", "--force"], ["rig.rays", "matches.csv"]);
+    let mut all = Vec::new();
+    for between in 0..=files.len() {
+        let (before, after) = files.split_at(between);
+        let arguments = [&["measure"][..], before, &flags, after].concat();
+        run(path, &arguments).assert_code(0);
+        all.push(fs::read(path.join("p.csv")).unwrap());
+    }
+    assert!(all.windows(2).all(|pair| pair[0] == pair[1]));
+    let compare = ["calibration.json", "--quiet", "calibration.json"];
+    run(path, &[&["compare"][..], &compare].concat()).assert_code(0);
+    // These get as far as to look into the files.
+    run(
+        path,
+        &["verify", "calibration.json", "--exclude", "1", "nowhere"],
+    )
+    .assert_code(2)
+    .assert_says(&["nowhere"]);
+    let device = ["--device", "tcp:127.0.0.1:1"];
+    for arguments in [
+        ["matches.csv", device[0], device[1]],
+        [device[0], device[1], "matches.csv"],
+    ] {
+        run(
+            path,
+            &[&["measure", "-o", "p.csv"][..], &arguments].concat(),
+        )
+        .assert_code(2)
+        .assert_says(&[device[1]]);
+    }
+
+    run(path, &["measure", "matches.csv", "-o", "p.csv"])
+        .assert_code(2)
+        .assert_says(&[
+            "not provided",
+            "MATCHES.csv",
+            "--device <ADDRESS> <MATCHES.csv>",
+        ]);
+    let both = [&["measure", "-o", "p.csv"][..], &files, &device].concat();
+    run(path, &both)
+        .assert_code(2)
+        .assert_says(&["cannot be used with"]);
+}
+
+#[test]
 fn measure_prints_one_object_and_writes_the_same_bytes_again() {
     let (folder, _) = measuring();
     let arguments = [

@@ -4,6 +4,7 @@ mod alternating;
 mod bad_images;
 mod bad_input;
 mod bad_views;
+mod calibration_file;
 mod commands;
 mod common;
 mod cross_checks;

@@ -14,6 +14,7 @@ use calib_rays::geometry::{RigidTransform, nearest_point};
 use calib_rays::numerics::median;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -81,7 +82,7 @@ impl AlternatingSettings {
 }
 
 /// A start with what it costs.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StartCost {
     /// Which.
     pub kind: StartKind,
@@ -90,7 +91,7 @@ pub struct StartCost {
 }
 
 /// The circles of one stage placement.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PlacementCircles {
     /// Number of the placement.
     pub placement: usize,

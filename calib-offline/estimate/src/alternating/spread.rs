@@ -12,6 +12,7 @@ use crate::adjust::observations::{ObservedCorner, ViewBlock};
 use calib_rays::numerics::median;
 use calib_rays::numerics::rms;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// One corner in so many is left out.
@@ -28,7 +29,7 @@ const SHARES: [f64; 17] = [
 const VIEWS: usize = 12;
 
 /// Errors of the networks of one spread, all views together.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SpreadError {
     /// The spread, px.
     pub spread_px: f64,
@@ -40,7 +41,7 @@ pub struct SpreadError {
 }
 
 /// A sweep and what was chosen from it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SpreadChoice {
     /// The spread taken, px.
     pub spread_px: f64,

@@ -9,6 +9,7 @@
 use calib_rays::geometry::{RigidTransform, best_placement, so3};
 use calib_rays::numerics::SingularValues;
 use nalgebra::{Matrix3, Matrix3x2, MatrixXx3, Vector2, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Fewest poses of a placement: three points always have a circle.
@@ -17,11 +18,13 @@ pub const MIN_POSES: usize = 4;
 pub const MIN_SWEEP_RAD: f64 = 0.1;
 
 /// The axis of one placement and what turned about it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StageCircles {
     /// The point of the axis nearest to the corners' mean, mm.
+    #[schemars(with = "[f64; 3]")]
     pub point_mm: Vector3<f64>,
     /// Unit vector along it: the common normal of the circles.
+    #[schemars(with = "[f64; 3]")]
     pub direction: Vector3<f64>,
     /// Radius of each corner's circle, mm, in the order of the corners.
     pub radii_mm: Vec<f64>,

@@ -12,10 +12,11 @@ use crate::init::rig::RigStart;
 use crate::pinhole::{CameraFit, Loss, PinholeRig, RigSettings, Settings, calibrate_rig};
 use calib_rays::geometry::RigidTransform;
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Where poses come from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum StartKind {
     /// Pinhole with distortion per camera; poses of several cameras averaged: the publication's.

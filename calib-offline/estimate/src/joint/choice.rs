@@ -9,6 +9,7 @@ use super::rebase::rebase;
 use crate::adjust::{CameraModel, Model, Observations};
 use calib_rays::field::spline::{Spline, SplineGrid};
 use calib_rays::field::structured::TILT_DEGREE;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Spacing of a first spline, in cells along the sensor's longer side: 56 px on 1280 px.
@@ -38,7 +39,7 @@ pub const NEEDED_GAIN: f64 = 4.0;
 const MOST_REBASES: usize = 3;
 
 /// A change of the model that was best until then.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Alternative {
     /// Every camera gets an offset: its rays need not meet in one point.
@@ -72,7 +73,7 @@ pub enum Alternative {
 }
 
 /// An alternative that was tried.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Choice {
     /// What it changes.
     pub tried: Alternative,

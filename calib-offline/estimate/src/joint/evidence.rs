@@ -12,6 +12,7 @@ use calib_rays::numerics::banded::BandedMatrix;
 use nalgebra::DVector;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -44,7 +45,7 @@ const PROBES: usize = 16;
 const PROBE_SEED: u64 = 0x5eed;
 
 /// A family of parameters that share one smoothness weight.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Family {
     /// Directions of the field's polynomial of this total degree, beyond the structured ones; of
@@ -144,7 +145,7 @@ pub struct Smoothness {
 }
 
 /// What the evidence found for one family.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SmoothnessFound {
     /// Index of the camera.
     pub camera_idx: usize,

@@ -1,10 +1,11 @@
 //! The lens underneath a ray field: what the field's polynomial and spline deviate from.
 
 use nalgebra::{Matrix2, Vector2};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How the base lens maps the angle off axis to a radius on the sensor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Projection {
     /// `radius = f tan(theta)`.
@@ -30,7 +31,7 @@ const LARGEST_ANGLE_RAD: f64 = 3.0;
 ///
 /// It has no say in what a field can follow: it only leaves the polynomial a small smooth
 /// difference, which the smoothness weights judge.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BaseLens {
     /// Kind of lens.
     pub projection: Projection,

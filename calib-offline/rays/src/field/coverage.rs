@@ -2,13 +2,14 @@
 
 use crate::geometry::hull::convex_hull;
 use crate::geometry::{PixelPoint, SensorSize};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The calibrated area as a grid of equal cells over the sensor, outer edge to outer edge.
 ///
 /// A cell counts as calibrated if it touches the convex hull of the observed corners, so the
 /// margin beyond the hull is less than one cell.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct CoverageMask {
     /// The sensor that the mask covers.
     pub sensor: SensorSize,

@@ -2,6 +2,7 @@
 
 use crate::geometry::{PixelPoint, SensorSize};
 use nalgebra::{Matrix2, Vector2};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Number of products `P_i(x) P_j(y)` with `i + j <= degree`.
@@ -94,11 +95,12 @@ pub fn basis(sensor: SensorSize, degree: usize, pixel: PixelPoint, out: &mut Vec
 }
 
 /// A polynomial map from the sensor to two numbers.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Polynomial {
     /// Highest total degree.
     pub degree: usize,
     /// One pair per product, in the order of [`terms`].
+    #[schemars(with = "Vec<[f64; 2]>")]
     pub coefficients: Vec<Vector2<f64>>,
 }
 

@@ -6,10 +6,11 @@ use super::spline::Spline;
 use super::transport;
 use crate::geometry::{PixelPoint, Ray, SensorSize};
 use nalgebra::{Matrix2, Vector2};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A smooth map from the sensor to two numbers: polynomial plus spline deviation.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SmoothMap {
     /// The part of low degree.
     pub polynomial: Polynomial,
@@ -44,7 +45,7 @@ impl SmoothMap {
 /// `s(x)` ([`transport`]), the two axes `E` across it, and the offset `m(x)` in mm. `E m` is the
 /// foot point of the camera's reference point on the ray. All rays of a central camera meet in
 /// the reference point: it has no offset.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RayField {
     /// The sensor that the field covers.
     pub sensor: SensorSize,

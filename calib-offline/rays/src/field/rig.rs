@@ -7,10 +7,11 @@ use crate::geometry::{
     triangulate_rays,
 };
 use nalgebra::{Matrix3, Matrix3x2, Matrix3x4, Matrix4, Vector3, Vector4};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// One calibrated camera.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CalibratedCamera {
     /// Unique in the rig.
     pub name: String,
@@ -23,7 +24,7 @@ pub struct CalibratedCamera {
 }
 
 /// One or more calibrated cameras in the rig frame.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Rig {
     /// In the dataset's order.
     pub cameras: Vec<CalibratedCamera>,

@@ -3,13 +3,14 @@
 
 use crate::geometry::{PixelPoint, SensorSize};
 use nalgebra::{Matrix2, RowVector2, Vector2};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Where the knots lie: the sensor, from outer edge to outer edge, cut into equal cells.
 ///
 /// A grid of `cells_u` x `cells_v` cells has `(cells_u + 3) x (cells_v + 3)` knots; the four knots
 /// that matter along u in cell `i` are `i ..= i + 3`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct SplineGrid {
     /// The sensor that the grid covers.
     pub sensor: SensorSize,
@@ -91,11 +92,12 @@ fn axis_weights(x: f64, extent_px: u32, cells: usize) -> AxisWeights {
 }
 
 /// A spline map from the sensor to two numbers.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Spline {
     /// Where the knots lie.
     pub grid: SplineGrid,
     /// One pair per knot, row-major.
+    #[schemars(with = "Vec<[f64; 2]>")]
     pub coefficients: Vec<Vector2<f64>>,
 }
 

@@ -2,6 +2,7 @@
 
 use crate::geometry::{PixelPoint, SensorSize};
 use nalgebra::Matrix4;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Joint covariance of where two cameras see one point at the working distance, px^2.
@@ -12,7 +13,7 @@ use serde::{Deserialize, Serialize};
 /// become one covariance. Components: first camera's u and v, second camera's u and v. The two
 /// pixels are *not* independent: poses are shared, so errors of both cameras go together, and a
 /// sum of separate covariances would overstate the error of a point about twofold.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PairUncertainty {
     /// Index of the camera whose sensor the grid covers.
     pub first: usize,

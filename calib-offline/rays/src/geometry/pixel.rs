@@ -3,10 +3,11 @@
 //! The center of the top-left pixel is (0, 0); u points right, v down. A full image spans
 //! (-0.5, -0.5) to (width - 0.5, height - 0.5).
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A point on the sensor, px.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PixelPoint {
     /// To the right; 0 is the center of the leftmost pixel.
     pub u: f64,
@@ -27,7 +28,7 @@ impl PixelPoint {
 }
 
 /// Width and height of a sensor (or of the image region calibrated), in pixels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 pub struct SensorSize {
     /// Columns of pixels.
     pub width: u32,

@@ -2,15 +2,20 @@
 
 use super::so3;
 use nalgebra::{Matrix2x3, Matrix2x6, Matrix3, Vector3, Vector6};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// `point_in_a = rotation * point_in_b + translation_mm`; a variable of this type is named
 /// `a_from_b`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RigidTransform {
-    /// Proper orthonormal; column k is axis k of frame b seen in frame a.
+    /// Proper orthonormal; column k is axis k of frame b seen in frame a. Row by row in files; nine numbers, column by
+    /// column, in those of earlier versions.
+    #[serde(with = "rows")]
+    #[schemars(with = "[[f64; 3]; 3]")]
     pub rotation: Matrix3<f64>,
     /// Origin of frame b seen in frame a, mm.
+    #[schemars(with = "[f64; 3]")]
     pub translation_mm: Vector3<f64>,
 }
 
@@ -77,6 +82,39 @@ impl RigidTransform {
             so3::nearest_rotation(&self.rotation).unwrap_or(self.rotation),
             self.translation_mm,
         )
+    }
+}
+
+/// A rotation in a file.
+mod rows {
+    use nalgebra::Matrix3;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    #[derive(Deserialize)]
+    #[serde(
+        untagged,
+        expecting = "a rotation is three rows of three numbers, [[..], [..], [..]]"
+    )]
+    enum Written {
+        Rows([[f64; 3]; 3]),
+        ColumnByColumn([f64; 9]),
+    }
+
+    pub(super) fn serialize<S: Serializer>(
+        rotation: &Matrix3<f64>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        let rows: [[f64; 3]; 3] = rotation.transpose().into();
+        rows.serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Matrix3<f64>, D::Error> {
+        Ok(match Written::deserialize(deserializer)? {
+            Written::Rows(rows) => Matrix3::from(rows).transpose(),
+            Written::ColumnByColumn(numbers) => Matrix3::from_column_slice(&numbers),
+        })
     }
 }
 

@@ -3,6 +3,7 @@
 use super::target::TargetSpec;
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::SensorSize;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -83,7 +84,7 @@ pub struct CameraSpec {
 }
 
 /// What stands before a camera, as far as the user declares it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ExpectedOptics {
     /// A lens in air: all rays meet in a point.
@@ -103,7 +104,7 @@ pub enum ExpectedOptics {
 }
 
 /// Standard deviations and temperatures of the board; a key that is not given is not known.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Certificate {
     /// Of the scale, parts per million.
     pub scale_ppm_sd: Option<f64>,
@@ -143,7 +144,7 @@ impl Certificate {
 }
 
 /// What the recording is called, who made it, and when; text as it stands in the manifest.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct RecordingSpec {
     /// Name.
     pub name: Option<String>,

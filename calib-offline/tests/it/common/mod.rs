@@ -19,6 +19,7 @@ use std::process::{Command, Stdio};
 pub mod against_truth;
 pub mod documented;
 pub mod halves;
+pub mod json_schema;
 pub mod snapshot;
 pub mod standard;
 
@@ -186,6 +187,8 @@ pub fn calibration() -> Calibration {
     Calibration {
         schema: SCHEMA.to_owned(),
         tool_version: "0.0.0".to_owned(),
+        command: None,
+        cameras: Vec::new(),
         method: "joint".to_owned(),
         input_sha256: "0".repeat(64),
         board: BOARD,
