@@ -6,7 +6,7 @@ use calib_judge::verdict::Grade;
 use calib_judge::{Cause, Code};
 use calib_recording::dataset::image::ImageError;
 use calib_recording::dataset::{CornersError, ManifestError, SufficiencyError};
-use calib_recording::detect::DetectError;
+use calib_recording::detect::{DetectError, OddImage};
 use std::error::Error as _;
 
 impl Error {
@@ -59,6 +59,22 @@ fn of_calibration(error: &CalibrateError) -> Option<Code> {
             ImageError::WrongSize { .. } => Some(Code::ImageSize),
             _ => None,
         },
+        CalibrateError::Detect(DetectError::WrongSizes { images, .. }) => {
+            let is_turned = |image: &OddImage| {
+                (image.found.width, image.found.height)
+                    == (image.expected.height, image.expected.width)
+            };
+            Some(if images.iter().all(is_turned) {
+                Code::UvExchanged
+            } else {
+                Code::ImageSize
+            })
+        }
+        CalibrateError::Detect(DetectError::WrongCount { found, stated, .. })
+            if (found.rows, found.cols) == (stated.cols, stated.rows) =>
+        {
+            Some(Code::RowsColsSwapped)
+        }
         CalibrateError::Sufficiency(source) | CalibrateError::FewImages { source, .. } => {
             match source {
                 SufficiencyError::SameView { .. } => Some(Code::Duplicates),

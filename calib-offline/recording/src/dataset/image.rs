@@ -1,8 +1,12 @@
 //! Gray images: PNG, JPEG, TIFF, BMP, PGM of 8 or 16 bits, as numbers to measure in.
 
+pub mod bayer;
+mod jpeg_end;
+
 use calib_rays::geometry::SensorSize;
 use calib_rays::remedy::Remedy;
-use image::{DynamicImage, ImageFormat};
+use image::{DynamicImage, ImageFormat, ImageReader};
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 /// A gray image; values are the file's own code values (0 to [`GrayImage::white_level`]).
@@ -12,7 +16,8 @@ pub struct GrayImage {
     pub sensor: SensorSize,
     /// Row-major, `width * height` values.
     pub values: Vec<f32>,
-    /// The largest value that the file format can hold: 255 or 65535.
+    /// The largest value that its pixels can have: 255, or of 16 bits what the bits in use can hold: 1023 where no
+    /// pixel has more, then 4095, 16383, 65535.
     pub white_level: f32,
 }
 
@@ -36,6 +41,23 @@ pub enum ImageError {
         /// What the decoder said.
         source: image::ImageError,
     },
+    /// A kind of image that is not read.
+    #[error(
+        "{}: this kind of image is not read: {what}; read are PNG, JPEG, TIFF, BMP and PGM with whole numbers of \
+         8 or 16 bits, gray or color", path.display()
+    )]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// What it is.
+        what: String,
+    },
+    /// The file ends before the image does.
+    #[error("{}: the file ends early: its lower part is missing", path.display())]
+    CutOff {
+        /// The file.
+        path: PathBuf,
+    },
     /// The image is not as large as the manifest says.
     #[error(
         "{}: is {found} pixels, but the manifest says {expected} for this camera", path.display()
@@ -53,7 +75,10 @@ pub enum ImageError {
 impl Remedy for ImageError {
     fn remedy(&self) -> Option<String> {
         let text = match self {
-            Self::Unreadable { .. } | Self::Undecodable { .. } => {
+            Self::Unsupported { .. } => {
+                "convert the images without loss: to PNG or TIFF with 8 or 16 bits a pixel, neither scaled nor cropped"
+            }
+            Self::Unreadable { .. } | Self::Undecodable { .. } | Self::CutOff { .. } => {
                 "copy the image again; or leave the pose out with exclude under [dataset], or take \
                  the image out of the camera's list (image_list, with \"\" in its place)"
             }
@@ -93,21 +118,43 @@ impl GrayImage {
             source,
         };
         let bytes = std::fs::read(path).map_err(unreadable)?;
+        if jpeg_end::is_cut_off(&bytes) {
+            return Err(ImageError::CutOff {
+                path: path.to_path_buf(),
+            });
+        }
         // From memory: the decoders are compiled once, in their own crate, and not for files here again.
-        let format = image::guess_format(&bytes)
-            .or_else(|unknown| ImageFormat::from_path(path).map_err(|_| unknown));
-        let decoded = format.and_then(|format| image::load_from_memory_with_format(&bytes, format));
-        let decoded = decoded.map_err(|source| match source {
-            image::ImageError::IoError(source) => ImageError::Unreadable {
+        let format = format_of(&bytes, path)?;
+        let decoded = image::load_from_memory_with_format(&bytes, format);
+        let decoded = decoded.map_err(|source| not_decoded(path, source))?;
+        drop(bytes);
+        if matches!(
+            decoded,
+            DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)
+        ) {
+            return Err(ImageError::Unsupported {
                 path: path.to_path_buf(),
-                source,
-            },
-            source => ImageError::Undecodable {
-                path: path.to_path_buf(),
-                source,
-            },
+                what: "floating-point numbers".to_owned(),
+            });
+        }
+        Ok(Self::from_decoded(decoded))
+    }
+
+    /// Width and height that a file's header gives, without decoding it.
+    ///
+    /// # Errors
+    /// [`ImageError`], naming the file, if there is no header that is known.
+    pub fn size_of(path: &Path) -> Result<SensorSize, ImageError> {
+        let bytes = std::fs::read(path).map_err(|source| ImageError::Unreadable {
+            path: path.to_path_buf(),
+            source,
         })?;
-        Ok(Self::from_decoded(&decoded))
+        let format = format_of(&bytes, path)?;
+        let reader = ImageReader::with_format(Cursor::new(bytes), format);
+        let (width, height) = reader
+            .into_dimensions()
+            .map_err(|source| not_decoded(path, source))?;
+        Ok(SensorSize::new(width, height))
     }
 
     /// Like [`GrayImage::load`], and refuses an image of another size than the manifest's.
@@ -127,7 +174,7 @@ impl GrayImage {
         }
     }
 
-    fn from_decoded(decoded: &DynamicImage) -> Self {
+    fn from_decoded(decoded: DynamicImage) -> Self {
         let sensor = SensorSize::new(decoded.width(), decoded.height());
         let deep = matches!(
             decoded,
@@ -135,16 +182,16 @@ impl GrayImage {
                 | DynamicImage::ImageLumaA16(_)
                 | DynamicImage::ImageRgb16(_)
                 | DynamicImage::ImageRgba16(_)
-                | DynamicImage::ImageRgb32F(_)
-                | DynamicImage::ImageRgba32F(_)
         );
-        let (values, white_level) = if deep {
-            let gray = decoded.to_luma16();
-            let values = gray.as_raw().iter().map(|&v| f32::from(v)).collect();
-            (values, f32::from(u16::MAX))
+        let (values, white_level): (Vec<f32>, f32) = if deep {
+            let gray = decoded.into_luma16().into_raw();
+            let largest = gray.iter().copied().max().unwrap_or(0);
+            let white = BITS_IN_USE.into_iter().find(|white| largest <= *white);
+            let values = gray.into_iter().map(f32::from).collect();
+            (values, f32::from(white.unwrap_or(u16::MAX)))
         } else {
-            let gray = decoded.to_luma8();
-            let values = gray.as_raw().iter().map(|&v| f32::from(v)).collect();
+            let gray = decoded.into_luma8().into_raw();
+            let values = gray.into_iter().map(f32::from).collect();
             (values, f32::from(u8::MAX))
         };
         Self {
@@ -229,6 +276,52 @@ impl GrayImage {
     }
 }
 
+/// The largest numbers of 10, 12 and 14 bits, as sensors deliver them in 16.
+const BITS_IN_USE: [u16; 3] = [1023, 4095, 16383];
+
+/// Beginnings of files that are images of a kind that is not read.
+const OTHER_KINDS: [(usize, &[u8], &str); 8] = [
+    (4, b"jP  ", "JPEG 2000"),
+    (0, b"\xff\x4f\xff\x51", "JPEG 2000"),
+    (4, b"ftypavif", "AVIF"),
+    (4, b"ftypheic", "HEIC"),
+    (8, b"WEBP", "WebP"),
+    (0, b"GIF8", "GIF"),
+    (0, b"\x76\x2f\x31\x01", "OpenEXR"),
+    (0, b"FUJIFILMCCD-RAW", "a camera maker's raw file"),
+];
+
+/// What a file is, by its beginning or else by its name.
+fn format_of(bytes: &[u8], path: &Path) -> Result<ImageFormat, ImageError> {
+    let begins = |(at, mark, _): &&(usize, &[u8], &str)| {
+        bytes.get(*at..).is_some_and(|rest| rest.starts_with(mark))
+    };
+    if let Some((.., what)) = OTHER_KINDS.iter().find(begins) {
+        return Err(ImageError::Unsupported {
+            path: path.to_path_buf(),
+            what: (*what).to_owned(),
+        });
+    }
+    image::guess_format(bytes)
+        .or_else(|unknown| ImageFormat::from_path(path).map_err(|_| unknown))
+        .map_err(|source| ImageError::Undecodable {
+            path: path.to_path_buf(),
+            source,
+        })
+}
+
+fn not_decoded(path: &Path, source: image::ImageError) -> ImageError {
+    let path = path.to_path_buf();
+    match source {
+        image::ImageError::IoError(source) => ImageError::Unreadable { path, source },
+        image::ImageError::Unsupported(what) => ImageError::Unsupported {
+            path,
+            what: what.to_string(),
+        },
+        source => ImageError::Undecodable { path, source },
+    }
+}
+
 fn lerp(a: f64, b: f64, t: f64) -> f64 {
     if t == 0.0 { a } else { a + (b - a) * t }
 }
@@ -256,10 +349,12 @@ mod tests {
         }
         for name in ["b.png", "b.tiff", "b.pgm"] {
             let path = folder.path().join(name);
-            ramp(1000).save(&path).unwrap();
-            let read = GrayImage::load(&path).unwrap();
-            assert_eq!(read.white_level, 65535.0, "{name}");
-            assert_eq!(read.at(2, 1), Some(9000.0), "{name}");
+            for (scale, white_level) in [(1000, 65535.0), (100, 4095.0), (30, 1023.0)] {
+                ramp(scale).save(&path).unwrap();
+                let read = GrayImage::load(&path).unwrap();
+                assert_eq!(read.white_level, white_level, "{name}");
+                assert_eq!(read.at(2, 1), Some(9.0 * f32::from(scale)), "{name}");
+            }
         }
         // JPEG is lossy; a flat image comes back to within the quantization of its mean.
         let path = folder.path().join("c.jpg");
@@ -287,6 +382,21 @@ mod tests {
             std::fs::write(&path, bytes).unwrap();
             let message = GrayImage::load(&path).unwrap_err().to_string();
             assert!(message.contains(name), "{message}");
+        }
+    }
+
+    #[test]
+    fn kinds_that_are_not_read_are_named_with_those_that_are() {
+        let folder = tempfile::tempdir().unwrap();
+        let float: ImageBuffer<Rgb<f32>, Vec<f32>> = ImageBuffer::new(4, 4);
+        let path = folder.path().join("float.tiff");
+        float.save(&path).unwrap();
+        let avif = folder.path().join("b.png");
+        std::fs::write(&avif, b"\0\0\0\x1cftypavif\0\0\0\0").unwrap();
+        for path in [path, avif] {
+            let error = GrayImage::load(&path).unwrap_err();
+            assert!(matches!(error, ImageError::Unsupported { .. }), "{error}");
+            assert!(error.to_string().contains("8 or 16 bits"), "{error}");
         }
     }
 

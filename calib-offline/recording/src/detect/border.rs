@@ -2,8 +2,8 @@
 //!
 //! A part of a board can be placed on it only if something tells where the board ends. Beyond the
 //! outermost corners lies one more row of squares, whole or trimmed, and behind it the bright
-//! margin: its dark squares end along one line, and there the bright ones stay bright. Were there
-//! more corners, the colors would change over at that line instead.
+//! margin: its dark squares end along one line, and there the bright ones stay bright. A dark frame does
+//! the same with the colors exchanged. Were there more corners, the colors would change over at that line instead.
 
 use super::grid::{FittedGrid, Node};
 use crate::dataset::image::GrayImage;
@@ -13,13 +13,15 @@ use calib_rays::numerics::median;
 const OUTWARD: [Node; 4] = [(-1, 0), (1, 0), (0, -1), (0, 1)];
 /// Between the outermost corners and this distance (in squares) the colors must be the squares'.
 const SQUARES_FROM: f64 = 0.2;
-/// The dark squares must have ended here: one square and some perspective.
+/// A dark frame is printed around whole squares; what ends them earlier covers them.
+const FRAME_FROM: f64 = 0.75;
+/// The squares of the other color must have ended here: one square and some perspective.
 const SQUARES_UNTIL: f64 = 1.25;
 /// Spacing of the samples, squares.
 const SAMPLE_STEP: f64 = 0.05;
-/// The ends of the dark squares must agree to this, squares.
+/// Their ends must agree to this, squares.
 const END_SPREAD: f64 = 0.25;
-/// The margin must be this wide at least behind the end of the dark squares, squares.
+/// The margin must be this wide at least behind their end, squares.
 const MARGIN_WIDTH: f64 = 0.15;
 /// Brightness from -1 (dark squares) to 1 (bright squares): beyond this it is clearly one of them.
 const CLEAR: f64 = 0.4;
@@ -71,27 +73,40 @@ fn is_border(image: &GrayImage, grid: &FittedGrid, outward: Node) -> bool {
     let profiles: Vec<Profile> = (first..last)
         .filter_map(|k| Profile::outward(image, grid, edge_node(k), edge_node(k + 1), outward))
         .collect();
-    let (bright, dark): (Vec<&Profile>, Vec<&Profile>) = profiles.iter().partition(|p| p.bright);
-    if bright.len() < MIN_SQUARES || dark.len() < MIN_SQUARES {
+    [1.0, -1.0]
+        .into_iter()
+        .any(|margin| ends_in_margin(&profiles, margin))
+}
+
+/// Whether the squares that are not of the margin's color end along one line, and those that are go on in it;
+/// `margin` is 1 for a bright one, -1 for a dark frame.
+fn ends_in_margin(profiles: &[Profile], margin: f64) -> bool {
+    let (alike, other): (Vec<&Profile>, Vec<&Profile>) = profiles
+        .iter()
+        .partition(|profile| profile.bright == (margin > 0.0));
+    if alike.len() < MIN_SQUARES || other.len() < MIN_SQUARES {
         return false;
     }
-    let ends: Vec<f64> = dark.iter().filter_map(|p| p.end_of_dark()).collect();
+    let ends: Vec<f64> = other.iter().filter_map(|p| p.end(margin)).collect();
     let Some(end) = median(ends.iter().copied()) else {
         return false;
     };
+    if margin < 0.0 && end < FRAME_FROM {
+        return false;
+    }
     let near_end = ends
         .iter()
         .filter(|e| (**e - end).abs() <= END_SPREAD / 2.0);
-    let margin = (end + SAMPLE_STEP, end + MARGIN_WIDTH);
-    let stay_bright = bright
+    let (from, until) = (end + SAMPLE_STEP, end + MARGIN_WIDTH);
+    let go_on = alike
         .iter()
-        .filter(|p| p.is_bright_between(SQUARES_FROM, margin.1));
-    let become_bright = dark
+        .filter(|p| p.is_margin_between(margin, SQUARES_FROM, until));
+    let become_margin = other
         .iter()
-        .filter(|p| p.is_bright_between(margin.0 + END_SPREAD / 2.0, margin.1 + END_SPREAD / 2.0));
-    enough(near_end.count(), dark.len())
-        && enough(stay_bright.count(), bright.len())
-        && enough(become_bright.count(), dark.len())
+        .filter(|p| p.is_margin_between(margin, from + END_SPREAD / 2.0, until + END_SPREAD / 2.0));
+    enough(near_end.count(), other.len())
+        && enough(go_on.count(), alike.len())
+        && enough(become_margin.count(), other.len())
 }
 
 fn enough(count: usize, of: usize) -> bool {
@@ -147,18 +162,19 @@ impl Profile {
         self.samples.get(index(from)..=index(until))
     }
 
-    fn is_bright_between(&self, from: f64, until: f64) -> bool {
+    fn is_margin_between(&self, margin: f64, from: f64, until: f64) -> bool {
         self.between(from, until)
-            .is_some_and(|samples| samples.iter().all(|&s| s >= CLEAR))
+            .is_some_and(|samples| samples.iter().all(|&s| margin * s >= CLEAR))
     }
 
-    /// Where a dark square ends and becomes bright, squares from the outermost corners.
-    fn end_of_dark(&self) -> Option<f64> {
+    /// Where a square of the other color ends and the margin's begins, squares from the outermost corners.
+    fn end(&self, margin: f64) -> Option<f64> {
         let start = (SQUARES_FROM / SAMPLE_STEP).round() as usize;
         let stop = (SQUARES_UNTIL / SAMPLE_STEP).round() as usize;
         let beginning = self.samples.get(start)?;
-        let end = (start..=stop).find(|&k| self.samples.get(k).is_some_and(|&s| s > 0.0))?;
-        (*beginning <= -CLEAR).then_some(end as f64 * SAMPLE_STEP)
+        let is_margin = |k: &usize| self.samples.get(*k).is_some_and(|&s| margin * s > 0.0);
+        let end = (start..=stop).find(is_margin)?;
+        (margin * beginning <= -CLEAR).then_some(end as f64 * SAMPLE_STEP)
     }
 }
 

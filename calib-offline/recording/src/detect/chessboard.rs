@@ -26,11 +26,11 @@ pub struct RawCorner {
 
 /// Finds the corners of a chessboard in an image.
 pub trait ChessboardDetector: Sync {
-    /// The corners of the largest connected grid, numbered from any origin and in any
+    /// The corners of every connected grid, largest first, each numbered from any origin and in any
     /// orientation, mirrored included; empty if there is none.
     ///
-    /// The grid may be a part of the board, and may have stray corners beside it.
-    fn detect(&self, image: &GrayImage, board: &BoardSpec) -> Vec<RawCorner>;
+    /// A grid may be a part of the board, may have stray corners beside it, and may be another board.
+    fn detect(&self, image: &GrayImage, board: &BoardSpec) -> Vec<Vec<RawCorner>>;
 }
 
 /// `ChESS` corners with a saddle-point refinement, joined to a grid by their triangulation.
@@ -48,29 +48,60 @@ const SMALLER: [Scale; 2] = [Scale(2.0), Scale(4.0)];
 const STRETCH_QUANTILES: [f64; 2] = [0.005, 0.995];
 
 impl ChessboardDetector for ChessTopologicalDetector {
-    fn detect(&self, image: &GrayImage, board: &BoardSpec) -> Vec<RawCorner> {
+    fn detect(&self, image: &GrayImage, board: &BoardSpec) -> Vec<Vec<RawCorner>> {
         let mut best = detect_at(image, Scale::FULL);
         let mut smaller = None;
         for scale in SMALLER {
-            if best.len() >= board.corner_count() {
+            if best.iter().any(|grid| is_whole(grid, board)) {
                 return best;
             }
             smaller = smaller.as_ref().unwrap_or(image).halved();
             let Some(at_scale) = &smaller else { break };
-            take_larger(&mut best, detect_at(at_scale, scale));
+            take_larger(&mut best, detect_at(at_scale, scale), board);
         }
-        if 2 * best.len() < board.corner_count()
+        if 2 * largest(&best, board) < board.corner_count()
             && let Some(double) = image.doubled()
         {
-            take_larger(&mut best, detect_at(&double, Scale::DOUBLE));
+            take_larger(&mut best, detect_at(&double, Scale::DOUBLE), board);
         }
         best
     }
 }
 
+/// Whether a grid has the board's extent and all of its corners.
+fn is_whole(grid: &[RawCorner], board: &BoardSpec) -> bool {
+    let extent = |of: fn(&RawCorner) -> i32| {
+        let (low, high) = grid
+            .iter()
+            .map(of)
+            .fold((i32::MAX, i32::MIN), |(low, high), k| {
+                (low.min(k), high.max(k))
+            });
+        (i64::from(high) - i64::from(low) + 1) as usize
+    };
+    if grid.len() != board.corner_count() {
+        return false;
+    }
+    let (i, j) = (extent(|corner| corner.i), extent(|corner| corner.j));
+    (i, j) == (board.cols, board.rows) || (i, j) == (board.rows, board.cols)
+}
+
+/// Corners of the grid that says most of the board: a whole one more than any.
+fn largest(grids: &[Vec<RawCorner>], board: &BoardSpec) -> usize {
+    let count = |grid: &Vec<RawCorner>| {
+        if is_whole(grid, board) {
+            usize::MAX / 2
+        } else {
+            grid.len()
+        }
+    };
+    grids.iter().map(count).max().unwrap_or(0)
+}
+
 /// A corner more or less at another size is no reason to give up the sharper ones.
-fn take_larger(best: &mut Vec<RawCorner>, found: Vec<RawCorner>) {
-    if found.len() > best.len() + best.len() / 10 {
+fn take_larger(best: &mut Vec<Vec<RawCorner>>, found: Vec<Vec<RawCorner>>, board: &BoardSpec) {
+    let count = largest(best, board);
+    if largest(&found, board) > count + count / 10 {
         *best = found;
     }
 }
@@ -89,7 +120,7 @@ impl Scale {
     }
 }
 
-fn detect_at(image: &GrayImage, scale: Scale) -> Vec<RawCorner> {
+fn detect_at(image: &GrayImage, scale: Scale) -> Vec<Vec<RawCorner>> {
     let [black, white] = image.quantiles(STRETCH_QUANTILES);
     let stretched = image.stretched(black, white);
     let view = GrayImageView {
@@ -102,17 +133,21 @@ fn detect_at(image: &GrayImage, scale: Scale) -> Vec<RawCorner> {
     let Ok(grid) = TopologicalGrid::new(ChessboardParams::default()) else {
         return Vec::new();
     };
-    let largest = grid.detect(&corners);
-    let corners = largest.map(|found| found.corners).unwrap_or_default();
-    corners
+    let mut grids: Vec<Vec<RawCorner>> = grid
+        .detect_all(&corners)
         .iter()
-        .map(|corner| RawCorner {
-            i: corner.grid.u,
-            j: corner.grid.v,
-            pixel: PixelPoint::new(
-                scale.original(corner.position.x),
-                scale.original(corner.position.y),
-            ),
+        .map(|found| {
+            let raw = found.corners.iter().map(|corner| RawCorner {
+                i: corner.grid.u,
+                j: corner.grid.v,
+                pixel: PixelPoint::new(
+                    scale.original(corner.position.x),
+                    scale.original(corner.position.y),
+                ),
+            });
+            raw.collect()
         })
-        .collect()
+        .collect();
+    grids.sort_by_key(|grid| std::cmp::Reverse(grid.len()));
+    grids
 }

@@ -9,6 +9,11 @@ const MIN_CONTRAST_PERCENT: f64 = 4.0;
 /// Without a board, edges at least this wide are called blurred, px.
 const BLURRED_EDGE_PX: f64 = 8.0;
 
+/// Smaller squares leave too few pixels between corners.
+const SMALLEST_SQUARE_PX: f64 = 6.0;
+/// More noise than this part of the contrast hides corners.
+const MOST_NOISE_PERCENT: f64 = 18.0;
+
 /// What an image should show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shown {
@@ -53,9 +58,48 @@ pub enum Illegible {
         /// What was looked for.
         shown: Shown,
     },
+    /// Noise hides the corners.
+    #[error(
+        "too noisy: the image differs from clean squares by {noise_percent:.0} % of their contrast; light the {shown} \
+         better, expose longer, or average several images"
+    )]
+    Noisy {
+        /// RMS of what is no edge, percent of the contrast.
+        noise_percent: f64,
+        /// What was looked for.
+        shown: Shown,
+    },
+    /// Squares of a few pixels.
+    #[error(
+        "squares of {square_px:.1} px are too small, some {SMALLEST_SQUARE_PX:.0} px are needed; come nearer, use larger \
+         squares, or record at a higher resolution"
+    )]
+    SmallSquares {
+        /// Shorter side of a square, px.
+        square_px: f64,
+    },
 }
 
 impl Illegible {
+    /// What keeps a board that was found in part from being found as a whole; `None` if it is nothing of the image.
+    /// `noise_percent` is of the contrast.
+    pub fn of_board(square_px: f64, contrast_percent: f64, noise_percent: f64) -> Option<Self> {
+        let shown = Shown::Board;
+        if square_px < SMALLEST_SQUARE_PX {
+            return Some(Self::SmallSquares { square_px });
+        }
+        if contrast_percent < MIN_CONTRAST_PERCENT {
+            return Some(Self::LowContrast {
+                contrast_percent,
+                shown,
+            });
+        }
+        (noise_percent > MOST_NOISE_PERCENT).then_some(Self::Noisy {
+            noise_percent,
+            shown,
+        })
+    }
+
     /// Edges blurred by a standard deviation of so many pixels.
     pub fn blurred(blur_px: f64, shown: Shown) -> Self {
         Self::Blurred {

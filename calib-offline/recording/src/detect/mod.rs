@@ -18,6 +18,7 @@ mod edge_fit;
 pub mod epipolar;
 mod error;
 pub mod grid;
+pub mod grid_size;
 pub mod illegible;
 mod job;
 pub mod labelling;
@@ -29,25 +30,27 @@ pub mod turning;
 pub mod verdict;
 
 pub use detection::{Detection, TurnedImage};
-pub use error::DetectError;
+pub use error::{DetectError, OddImage};
 pub use pair_check::PairCheck;
 pub use settings::DetectSettings;
 
 use crate::dataset::Dataset;
-use crate::dataset::image::{GrayImage, ImageError};
+use crate::dataset::image::{GrayImage, ImageError, bayer};
 use border::Borders;
 use calib_rays::board::BoardSpec;
 use calib_rays::observed::{Corner, View};
 use calib_rays::progress::Progress;
-use chessboard::{ChessTopologicalDetector, ChessboardDetector};
+use chessboard::{ChessTopologicalDetector, ChessboardDetector, RawCorner};
 use consistency::UnsettledView;
 use detection::turned_images;
 use grid::FittedGrid;
+use grid_size::GridSize;
 use illegible::{Illegible, Shown};
-use job::{Job, all_loaded};
+use job::{Job, all_loaded, check_sizes};
 use labelling::{Placement, placements};
 use pair_check::pair_checks;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use verdict::{ImageFigures, ImageVerdict, Outcome, Refusal, why_not_placed, why_nothing_found};
 
 /// What one image shows by itself.
@@ -88,6 +91,7 @@ pub fn detect_dataset_with(
     if jobs.is_empty() {
         return Err(DetectError::NoImages);
     }
+    check_sizes(dataset, &jobs)?;
     progress.begin("detecting corners", jobs.len());
     let loaded: Vec<Result<Result<Inspected, Refusal>, ImageError>> = jobs
         .par_iter()
@@ -100,6 +104,7 @@ pub fn detect_dataset_with(
         .collect();
     progress.end();
     let inspected = all_loaded(dataset, &jobs, loaded)?;
+    check_count(&dataset.board, &inspected)?;
 
     let mut figures = Vec::new();
     let mut refusals: Vec<Option<Refusal>> = Vec::new();
@@ -136,7 +141,7 @@ pub fn detect_dataset_with(
                     views.push(labelled_view(&view, &placement, settings));
                     used(&view, &placement, &dataset.board)
                 }
-                Some((view, None)) => Outcome::Refused(not_settled(&view)),
+                Some((view, None)) => Outcome::Refused(not_settled(&view, figures.as_ref())),
                 None => Outcome::Refused(Refusal::NoBoard),
             },
         };
@@ -174,34 +179,116 @@ fn jobs(dataset: &Dataset) -> Vec<Job<'_>> {
     jobs
 }
 
-/// What one image shows by itself: the corners, and where on the board they can be.
+/// Fewest images with the same other board that speak against the manifest.
+const SEVERAL: usize = 2;
+
+/// Whether the manifest's count is that of the boards seen: partial boards would be given labels off by a row.
+///
+/// # Errors
+/// [`DetectError::WrongCount`] where more images show one whole board of another size than show the manifest's.
+fn check_count(
+    board: &BoardSpec,
+    inspected: &[Result<Inspected, Refusal>],
+) -> Result<(), DetectError> {
+    let mut others: BTreeMap<GridSize, usize> = BTreeMap::new();
+    for found in inspected {
+        if let Err(Refusal::WrongBoard {
+            found,
+            is_whole: true,
+            ..
+        }) = found
+        {
+            *others.entry(*found).or_default() += 1;
+        }
+    }
+    let is_stated = |found: &&Inspected| found.grid.corners.len() == board.corner_count();
+    let stated_count = inspected.iter().flatten().filter(is_stated).count();
+    match others.into_iter().max_by_key(|(_, count)| *count) {
+        Some((found, count)) if count >= SEVERAL && count > stated_count => {
+            Err(DetectError::WrongCount {
+                found,
+                stated: GridSize::stated(board),
+                count,
+                stated_count,
+                of: inspected.len(),
+            })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// What one image shows by itself: the corners, and where on the board they can be. Of several grids the one that
+/// can be placed with most corners; an image without any is looked at as a raw color mosaic.
 fn inspect(
     detector: &dyn ChessboardDetector,
     image: &GrayImage,
     board: &BoardSpec,
     settings: &DetectSettings,
 ) -> Result<Inspected, Refusal> {
-    let raw = detector.detect(image, board);
-    let grid = FittedGrid::from_raw(image, &raw, board, settings.max_half_window_px)
+    let found = inspect_gray(detector, image, board, settings);
+    match found {
+        Err(_) => match bayer::balanced(image) {
+            Some(balanced) => inspect_gray(detector, &balanced, board, settings),
+            None => found,
+        },
+        found => found,
+    }
+}
+
+fn inspect_gray(
+    detector: &dyn ChessboardDetector,
+    image: &GrayImage,
+    board: &BoardSpec,
+    settings: &DetectSettings,
+) -> Result<Inspected, Refusal> {
+    let grids = detector.detect(image, board);
+    let mut best = Err(None);
+    for raw in &grids {
+        match (inspect_grid(image, raw, board, settings), &best) {
+            (Ok(found), Ok(Inspected { grid, .. }))
+                if found.grid.corners.len() <= grid.corners.len() => {}
+            (Ok(found), _) => best = Ok(found),
+            // Of the largest grid.
+            (Err(refusal), Err(None)) => best = Err(Some(refusal)),
+            (Err(_), _) => {}
+        }
+    }
+    best.map_err(|refusal| refusal.unwrap_or_else(|| why_nothing_found(image)))
+}
+
+/// What one grid of an image shows.
+fn inspect_grid(
+    image: &GrayImage,
+    raw: &[RawCorner],
+    board: &BoardSpec,
+    settings: &DetectSettings,
+) -> Result<Inspected, Refusal> {
+    let grid = FittedGrid::from_raw(image, raw, board, settings.max_half_window_px)
         .ok_or_else(|| why_nothing_found(image))?;
+    let figures = ImageFigures::of(image, &grid);
     if let (Some(typical), Some(square_px)) = (grid.typical(), grid.square_px())
         && typical.blur_px > verdict::MAX_BLUR_SQUARES * square_px
     {
         return Err(Illegible::blurred(typical.blur_px, Shown::Board).into());
     }
-    let borders = if grid.is_whole(board) {
+    let is_whole = grid.is_whole(board);
+    let borders = if is_whole {
         Borders::UNKNOWN
     } else {
         Borders::seen(image, &grid)
     };
     let placements = placements(&grid, board, &borders);
     if placements.is_empty() {
-        return Err(why_not_placed(&grid, board));
+        let refusal = why_not_placed(&grid, board, &Borders::seen(image, &grid));
+        return match figures.and_then(|figures| figures.illegible()) {
+            Some(illegible) if !refusal.is_of_a_whole_board() => Err(illegible.into()),
+            _ => Err(refusal),
+        };
     }
     Ok(Inspected {
-        figures: ImageFigures::of(image, &grid),
         grid,
         placements,
+        figures,
     })
 }
 
@@ -240,9 +327,12 @@ fn used(view: &UnsettledView, placement: &Placement, board: &BoardSpec) -> Outco
     }
 }
 
-fn not_settled(view: &UnsettledView) -> Refusal {
+fn not_settled(view: &UnsettledView, figures: Option<&ImageFigures>) -> Refusal {
     if view.placements.is_empty() {
         return Refusal::WrongColors;
+    }
+    if let Some(illegible) = figures.and_then(ImageFigures::illegible) {
+        return illegible.into();
     }
     let (i, j) = view.grid.size();
     Refusal::AmbiguousPlacement {

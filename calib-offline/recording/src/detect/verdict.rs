@@ -1,6 +1,8 @@
 //! What became of each image: used, or refused and why.
 
+use super::border::Borders;
 use super::grid::{FittedGrid, Typical};
+use super::grid_size::GridSize;
 use super::illegible::{EDGE_WIDTH_OF_BLUR, Illegible, Shown};
 use crate::dataset::image::GrayImage;
 use calib_rays::board::BoardSpec;
@@ -49,19 +51,15 @@ pub enum Refusal {
     #[error("no chessboard found: is the whole board in view, and lit evenly?")]
     NoBoard,
     /// A board of another size.
-    #[error(
-        "the image shows {found_rows} x {found_cols} inner corners, the manifest says rows = {rows}, \
-         cols = {cols}: {}", wrong_size_hint((*found_rows, *found_cols), (*rows, *cols))
-    )]
+    #[error("the image shows {found} inner corners, the manifest says rows = {}, cols = {}: {}",
+        stated.rows, stated.cols, found.hint(*stated))]
     WrongBoard {
-        /// Inner corners found along the shorter direction.
-        found_rows: usize,
-        /// Inner corners found along the longer direction.
-        found_cols: usize,
-        /// Rows in the manifest.
-        rows: usize,
-        /// Columns in the manifest.
-        cols: usize,
+        /// What is seen.
+        found: GridSize,
+        /// What the manifest says.
+        stated: GridSize,
+        /// Whether the image shows where that board ends, on all sides.
+        is_whole: bool,
     },
     /// A part of the board that could be any of several parts.
     #[error(
@@ -85,24 +83,10 @@ pub enum Refusal {
     WrongColors,
 }
 
-/// What to do about a board of another size; sizes are (rows, cols).
-fn wrong_size_hint(found: (usize, usize), stated: (usize, usize)) -> String {
-    let sorted = |(a, b): (usize, usize)| (a.min(b), a.max(b));
-    let (found, stated_sorted) = (sorted(found), sorted(stated));
-    if stated_sorted == (found.0 + 1, found.1 + 1) {
-        format!(
-            "rows and cols count inner corners, not squares; a board of {} x {} squares has rows = {}, \
-             cols = {}",
-            stated.0,
-            stated.1,
-            stated.0 - 1,
-            stated.1 - 1
-        )
-    } else {
-        format!(
-            "if this is the right board, write rows = {}, cols = {} (inner corners, not squares)",
-            found.0, found.1
-        )
+impl Refusal {
+    /// Whether it is because of a board of another size that is seen as a whole.
+    pub fn is_of_a_whole_board(&self) -> bool {
+        matches!(self, Self::WrongBoard { is_whole: true, .. })
     }
 }
 
@@ -126,6 +110,11 @@ pub struct ImageFigures {
 /// Squares blurred by more than this part of their side run into each other.
 pub const MAX_BLUR_SQUARES: f64 = 0.25;
 impl ImageFigures {
+    /// What of the image keeps a board that was found in part from being found as a whole.
+    pub fn illegible(&self) -> Option<Illegible> {
+        Illegible::of_board(self.square_px, self.contrast_percent, self.residual_percent)
+    }
+
     /// The figures of a grid; `None` if it has no corners.
     pub fn of(image: &GrayImage, grid: &FittedGrid) -> Option<Self> {
         let Typical {
@@ -151,12 +140,11 @@ pub fn why_nothing_found(image: &GrayImage) -> Refusal {
 }
 
 /// The grid, with the borders seen around it, is no part of the board.
-pub fn why_not_placed(grid: &FittedGrid, board: &BoardSpec) -> Refusal {
-    let (a, b) = grid.size();
+pub fn why_not_placed(grid: &FittedGrid, board: &BoardSpec, borders: &Borders) -> Refusal {
+    let size = grid.size();
     Refusal::WrongBoard {
-        found_rows: a.min(b),
-        found_cols: a.max(b),
-        rows: board.rows,
-        cols: board.cols,
+        found: GridSize::seen(size),
+        stated: GridSize::stated(board),
+        is_whole: borders.count() == 4 && grid.corners.len() == size.0 * size.1,
     }
 }

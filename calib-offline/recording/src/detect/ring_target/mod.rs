@@ -33,7 +33,7 @@ pub use located::{LabelledMarker, Located};
 pub use settings::TargetSettings;
 pub use verdict::{TargetFigures, TargetImage, TargetRefusal};
 
-use super::job::{Job, all_loaded};
+use super::job::{Job, all_loaded, check_sizes};
 use crate::dataset::image::GrayImage;
 use crate::dataset::{Dataset, TargetSpec, load_markers};
 use calib_rays::observed::{Corner, View};
@@ -58,6 +58,7 @@ pub fn detect_target(
     if jobs.is_empty() {
         return Err(TargetError::NoImages);
     }
+    check_sizes(dataset, &jobs)?;
     progress.begin("detecting markers", jobs.len());
     let loaded = jobs
         .par_iter()

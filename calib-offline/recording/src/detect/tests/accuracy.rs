@@ -20,7 +20,7 @@ fn rms_per_axis_px(noise: f64, blur_px: f64) -> f64 {
             let image = photo.take();
             let raw = ChessTopologicalDetector.detect(&image, &photo.board);
             let half_px = DetectSettings::default().max_half_window_px;
-            let grid = FittedGrid::from_raw(&image, &raw, &photo.board, half_px).unwrap();
+            let grid = FittedGrid::from_raw(&image, &raw[0], &photo.board, half_px).unwrap();
             assert_eq!(grid.corners.len(), 54, "tilt {tilt:?}");
             let errors: Vec<f64> = grid
                 .corners
@@ -60,7 +60,7 @@ fn predicted_sigma_is_the_scatter_of_the_corners() {
     photo.noise = 8.0;
     let image = photo.take();
     let raw = ChessTopologicalDetector.detect(&image, &photo.board);
-    let grid = FittedGrid::from_raw(&image, &raw, &photo.board, 20.0).unwrap();
+    let grid = FittedGrid::from_raw(&image, &raw[0], &photo.board, 20.0).unwrap();
     let normalized: Vec<f64> = grid
         .corners
         .values()

@@ -1,6 +1,7 @@
 //! One image: labels, parts of boards, refusals.
 
 use super::*;
+use calib_rays::remedy::Remedy;
 
 fn only(photo: Photo) -> Detection {
     let folder = tempfile::tempdir().unwrap();
@@ -209,19 +210,60 @@ fn an_image_of_another_size_or_no_image_is_refused_by_name() {
     );
     set.cameras[0].sensor = SensorSize::new(1280, 480);
     std::fs::write(folder.path().join("0_1.png"), b"no image").unwrap();
-    let broken = |set: &Dataset| match detect(set).unwrap_err() {
+    match detect(&set).unwrap_err() {
+        DetectError::WrongSizes { images, are_all } => {
+            // The file that is none has no size; loading names it.
+            assert_eq!((images.len(), are_all), (1, false));
+            assert_eq!((images[0].pose, images[0].file.as_str()), (0, "0_0.png"));
+        }
+        other => panic!("{other}"),
+    }
+    set.cameras[0].sensor = SENSOR;
+    match detect(&set).unwrap_err() {
         DetectError::BrokenImage {
             pose, more, source, ..
-        } => (pose, more, source.to_string()),
+        } => {
+            assert_eq!((pose, more), (1, 0));
+            assert!(source.to_string().contains("0_1.png"));
+        }
         other => panic!("{other}"),
-    };
-    let (pose, more, message) = broken(&set);
-    assert_eq!((pose, more), (0, 1));
-    assert!(message.contains("0_0.png") && message.contains("1280x480"));
-    set.cameras[0].sensor = SENSOR;
-    let (pose, more, message) = broken(&set);
-    assert_eq!((pose, more), (1, 0));
-    assert!(message.contains("0_1.png"));
+    }
     set.cameras.clear();
     assert!(matches!(detect(&set).unwrap_err(), DetectError::NoImages));
+}
+
+#[test]
+fn every_image_of_another_size_is_named_before_any_is_searched() {
+    let folder = tempfile::tempdir().unwrap();
+    let photo = tilted(board(6, 9), 0.0, [0.0, 0.0], 0.0, 0.0);
+    let photos = vec![photo.clone(), photo.clone(), photo];
+    let set = dataset(folder.path(), board(6, 9), false, &[photos]);
+    for pose in [0, 2] {
+        let odd = image::GrayImage::new(641, 481);
+        odd.save(folder.path().join(format!("0_{pose}.png")))
+            .unwrap();
+    }
+    let error = detect(&set).unwrap_err();
+    for part in ["0_0.png", "0_2.png", "641x481", "640x480"] {
+        assert!(error.to_string().contains(part), "{error}");
+    }
+    let remedy = error.remedy().unwrap();
+    assert!(remedy.contains("exclude = [0, 2]"), "{remedy}");
+}
+
+#[test]
+fn several_whole_boards_of_another_size_stop_the_search() {
+    let folder = tempfile::tempdir().unwrap();
+    let photos: Vec<Photo> = [[10.0, 15.0], [-15.0, 5.0], [5.0, -20.0]]
+        .map(|tilt| tilted(board(6, 9), 4.0, tilt, 0.0, 0.0))
+        .into();
+    let set = dataset(folder.path(), board(7, 10), false, &[photos]);
+    let error = detect(&set).unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .contains("3 of 3 images show a whole board of 6 x 9"),
+        "{error}"
+    );
+    assert!(error.remedy().unwrap().contains("rows = 6, cols = 9"));
 }
