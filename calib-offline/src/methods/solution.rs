@@ -193,7 +193,7 @@ pub(super) fn weighted(
     residuals: &[Vec<Option<Vector2<f64>>>],
     observations: &Observations,
 ) -> (StudentT, Vec<Vec<f64>>) {
-    let (noise, _) = reweight(residuals, observations, 1.0, None);
+    let (noise, _) = reweight(residuals, observations, 1.0, None, false);
     (noise, relative_weights(residuals, observations, &noise))
 }
 

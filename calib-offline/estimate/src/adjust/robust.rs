@@ -12,11 +12,14 @@ use nalgebra::Vector2;
 /// Degrees of freedom that are tried; the last is least squares to all practical purposes.
 const CANDIDATES: [f64; 6] = [3.0, 4.0, 6.0, 10.0, 20.0, 1000.0];
 
-/// A residual beyond this many standard deviations is no corner, whatever the tails.
-const REJECT_BEYOND_SIGMA: f64 = 8.0;
+/// A residual within this many standard deviations is that of a corner, however light the tails.
+const KEEP_WITHIN_SIGMA: f64 = 8.0;
 
 /// Logarithm of the density of outliers, 1/px^2: anywhere on a megapixel.
 pub const LN_OUTLIER_DENSITY: f64 = -13.8;
+
+/// Logarithm of the share of corners that are outliers before anything is seen: one in a hundred.
+const LN_OUTLIER_SHARE: f64 = -4.6;
 
 /// The distribution of residual vectors: `p(r) ~ (1 + |r|^2 / (nu v))^(-(nu + 2) / 2)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,28 +31,38 @@ pub struct StudentT {
 }
 
 impl StudentT {
-    /// Weight of a residual whose squared length is `squared_px2`, and 0 beyond the rejection
-    /// limit.
+    /// Weight of a residual whose squared length is `squared_px2`, and 0 where an outlier is likelier: with light
+    /// tails beyond a few standard deviations, with heavy ones, which real images have, many times further out.
     pub fn weight(&self, squared_px2: f64) -> f64 {
-        let ratio = squared_px2 / self.variance_px2;
-        if ratio > REJECT_BEYOND_SIGMA * REJECT_BEYOND_SIGMA {
-            0.0
+        let is_near = squared_px2 <= KEEP_WITHIN_SIGMA * KEEP_WITHIN_SIGMA * self.variance_px2;
+        if is_near
+            || self.log_density_of_corners(squared_px2) >= LN_OUTLIER_DENSITY + LN_OUTLIER_SHARE
+        {
+            self.tail_weight(squared_px2)
         } else {
-            (self.freedom + 2.0) / (self.freedom + ratio)
+            0.0
         }
     }
 
+    /// The same without a rejection limit: the pull of a residual falls with its length and never ends.
+    pub fn tail_weight(&self, squared_px2: f64) -> f64 {
+        (self.freedom + 2.0) / (self.freedom + squared_px2 / self.variance_px2)
+    }
+
     /// `ln p = -ln(2 pi v) - (nu + 2)/2 ln(1 + |r|^2/(nu v))` of a residual whose squared length is
-    /// given, 1/px^2. One beyond the rejection limit comes from anywhere, with a density that no
-    /// parameter changes.
+    /// given, 1/px^2. One that is rejected comes from anywhere, with a density that no parameter changes.
     pub fn log_density(&self, squared_px2: f64) -> f64 {
         if self.weight(squared_px2) > 0.0 {
-            -(2.0 * std::f64::consts::PI * self.variance_px2).ln()
-                - (self.freedom + 2.0) / 2.0
-                    * (squared_px2 / (self.freedom * self.variance_px2)).ln_1p()
+            self.log_density_of_corners(squared_px2)
         } else {
             LN_OUTLIER_DENSITY
         }
+    }
+
+    fn log_density_of_corners(&self, squared_px2: f64) -> f64 {
+        -(2.0 * std::f64::consts::PI * self.variance_px2).ln()
+            - (self.freedom + 2.0) / 2.0
+                * (squared_px2 / (self.freedom * self.variance_px2)).ln_1p()
     }
 
     /// The distribution, of those tried, that makes the residuals most likely. `squared_px2` are
@@ -115,13 +128,15 @@ const FLOOR_PX: f64 = 2e-5;
 
 /// The distribution of the residuals, and the weight in 1/px^2 that it gives to every corner.
 ///
-/// A corner behind its camera gets weight 0. `strength` scales all weights: 1 for independent
+/// A corner behind its camera gets weight 0. With `tails`, none is rejected: while a lens is still far from what it
+/// will be, its rim is off by more than any noise, and the corners there are all that can say so. `strength` scales all weights: 1 for independent
 /// corners, less if neighboring corners err alike. `known`: see [`StudentT::fit`].
 pub fn reweight(
     residuals: &[Vec<Option<Vector2<f64>>>],
     observations: &Observations,
     strength: f64,
     known: Option<&StudentT>,
+    tails: bool,
 ) -> (StudentT, Weights) {
     let squared = per_corner(residuals, observations, |residual, relative_weight| {
         let squared = residual.as_ref()?.norm_squared() * relative_weight;
@@ -129,9 +144,16 @@ pub fn reweight(
     });
     let flat: Vec<f64> = squared.iter().flatten().filter_map(|s| *s).collect();
     let noise = StudentT::fit(&flat, FLOOR_PX * FLOOR_PX, known);
+    let weight = |s: f64| {
+        if tails {
+            noise.tail_weight(s)
+        } else {
+            noise.weight(s)
+        }
+    };
     let weights = per_corner(&squared, observations, |squared, relative_weight| {
         squared.map_or(0.0, |s| {
-            strength * noise.weight(s) * relative_weight / noise.variance_px2
+            strength * weight(s) * relative_weight / noise.variance_px2
         })
     });
     (noise, weights)

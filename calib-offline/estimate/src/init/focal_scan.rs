@@ -231,7 +231,7 @@ fn adjust_cubic(
     };
     for _ in 0..rounds {
         let residuals = objective::residuals(&model, observations, &bases);
-        let (_, weights) = reweight(&residuals, observations, 1.0, None);
+        let (_, weights) = reweight(&residuals, observations, 1.0, None, false);
         model = levenberg::minimize(model, observations, &bases, &weights, &priors, settings).model;
     }
     let residuals = objective::residuals(&model, observations, &bases);

@@ -77,6 +77,7 @@ pub fn estimate(observations: &Observations, start: &RigStart) -> Result<Estimat
     // What every lens may use, then where its center of distortion is.
     let smoothness = Smoothness::structured_only(&model);
     let mut fit = Fit::new(model, smoothness, &observations);
+    fit.rejects = false;
     for _ in 0..STRUCTURED_ROUNDS {
         fit.adjust(&observations, STRUCTURED);
     }
@@ -85,6 +86,7 @@ pub fn estimate(observations: &Observations, start: &RigStart) -> Result<Estimat
         fit.adjust(&observations, STRUCTURED);
     }
     fit.smoothness = Smoothness::new(&fit.model);
+    fit.rejects = true;
 
     // What the evidence asks for beyond, first as if corners were independent: only a field that
     // fits shows how much they are not.

@@ -33,6 +33,8 @@ pub struct Fit {
     pub noise: StudentT,
     /// Share of corners that count as independent.
     pub share: f64,
+    /// Whether corners far from everything else are left out; not while a lens is found.
+    pub rejects: bool,
     /// Objective after each accepted step of the last adjustment.
     pub costs: Vec<f64>,
     /// Why the last adjustment ended.
@@ -59,6 +61,7 @@ impl Fit {
                 variance_px2: 1.0,
             },
             share: 1.0,
+            rejects: true,
             costs: Vec::new(),
             stop: StopReason::IterationLimit,
             effective_parameters: 0.0,
@@ -112,6 +115,7 @@ impl Fit {
             observations,
             self.share * freedom,
             self.is_weighted.then_some(&self.noise),
+            !self.rejects,
         );
         self.is_weighted = true;
         self.noise = StudentT {

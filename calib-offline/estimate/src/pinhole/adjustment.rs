@@ -125,7 +125,8 @@ pub fn minimize(
     if settings.loss == Loss::StudentT {
         for _ in 0..ROBUST_ROUNDS {
             let residuals = residuals(&state, observations);
-            let (noise, next) = reweight(&residuals, observations, 1.0, noise_found.as_ref());
+            let (noise, next) =
+                reweight(&residuals, observations, 1.0, noise_found.as_ref(), false);
             let change = noise_found.map_or(f64::INFINITY, |known: StudentT| {
                 (noise.variance_px2 / known.variance_px2).ln().abs()
             });
