@@ -1,7 +1,7 @@
 //! How near the joint estimate comes to the oracle, and how true its uncertainty is, over optics
 //! and noise draws: the table of `BENCHMARKS.md`.
 //!
-//! `cargo bench -p calib-offline --bench accuracy -- [ROW ...] [--draws N] [--detail]`. The oracle
+//! `cargo bench -p calib-offline --bench accuracy -- [ROW ...] [--draws N] [--first SEED] [--detail]`. The oracle
 //! triangulates the same noisy pixels with the true rays; 1 is the limit that their noise sets.
 //! Draws run in parallel; every figure is a mean over them.
 

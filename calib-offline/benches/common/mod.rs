@@ -16,12 +16,14 @@ pub type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + S
 /// Noise draws of a row unless told otherwise.
 const DRAWS: u64 = 5;
 
-/// `[NAME ...] [--draws N] [--detail]`.
+/// `[NAME ...] [--draws N] [--first SEED] [--detail]`.
 pub struct Arguments {
     /// Rows asked for; none for all.
     pub names: Vec<String>,
     /// Noise draws of a row.
     pub draws: u64,
+    /// Seed of the first.
+    pub first: u64,
     /// Whether to print what each draw gave.
     pub detail: bool,
 }
@@ -31,6 +33,7 @@ impl Arguments {
         let mut read = Self {
             names: Vec::new(),
             draws: DRAWS,
+            first: 1,
             detail: false,
         };
         // Cargo says --bench to every one.
@@ -39,6 +42,9 @@ impl Arguments {
             match argument.as_str() {
                 "--draws" => {
                     read.draws = arguments.next().ok_or("--draws needs a number")?.parse()?;
+                }
+                "--first" => {
+                    read.first = arguments.next().ok_or("--first needs a seed")?.parse()?;
                 }
                 "--detail" => read.detail = true,
                 _ => read.names.push(argument),
@@ -57,13 +63,13 @@ impl Arguments {
         Ok(optics.collect::<std::result::Result<_, String>>()?)
     }
 
-    /// What each draw of a row gives, by their seeds from 1; an error says row and seed.
+    /// What each draw of a row gives, by their seeds; an error says row and seed.
     pub fn drawn<T: Send, E: Display>(
         &self,
         row: &str,
         draw: impl Fn(u64) -> std::result::Result<T, E> + Sync,
     ) -> Result<Vec<T>> {
-        let drawn = (1..=self.draws)
+        let drawn = (self.first..self.first + self.draws)
             .into_par_iter()
             .map(|seed| draw(seed).map_err(|error| format!("{row} {seed}: {error}")))
             .collect::<std::result::Result<_, String>>()?;

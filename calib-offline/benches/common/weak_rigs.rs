@@ -28,11 +28,6 @@ pub const USUAL: Boards = Boards {
     depth: [0.8, 1.25],
     corners: [8, 10],
 };
-/// Tilted within 3 degrees.
-pub const SMALL_TILTS: Boards = Boards {
-    tilt_deg: 3.0,
-    ..USUAL
-};
 /// Distance of the middle board, mm: some 770 of 1280 px wide.
 pub const DISTANCE_MM: f64 = 470.0;
 const BASELINE_MM: f64 = 124.0;

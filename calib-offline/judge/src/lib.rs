@@ -24,7 +24,6 @@ pub mod task;
 pub mod unexpected_optics;
 pub mod validity;
 pub mod verdict;
-pub mod what_next;
 pub mod working_volume;
 
 pub use cause::{Cause, Code};
@@ -33,4 +32,3 @@ pub use expected_error::{Declared, ExpectedError, TaskError, expected_error};
 pub use held_out::{Folds, HeldOut, estimate_folds, held_out};
 pub use stage_axis::fit_stage_axes;
 pub use task::{Task, TaskWordsError};
-pub use what_next::what_to_record_next;

@@ -171,6 +171,7 @@ pub fn alternative(choice: &Choice, calibration: &Calibration) -> String {
             format!("{} central", camera.map_or("camera", |c| c.name.as_str()))
         }
         Alternative::NoSpline => "no spline".to_owned(),
+        Alternative::Pinhole => "pinholes with five numbers of distortion".to_owned(),
         Alternative::Plain { degree: None } => "plain lenses".to_owned(),
         Alternative::Plain {
             degree: Some(TILT_DEGREE),

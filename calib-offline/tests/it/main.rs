@@ -23,6 +23,6 @@ mod starting_points;
 mod target_command;
 mod uncertainty;
 mod verify;
+mod weak_geometry;
 #[path = "../../benches/common/weak_rigs.rs"]
 mod weak_rigs;
-mod what_next;

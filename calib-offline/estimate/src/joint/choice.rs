@@ -5,6 +5,8 @@
 use super::error::EstimateError;
 use super::evidence::Family;
 use super::fit::Fit;
+use super::pinhole_lens::are_pinholes;
+use super::pinholes::pinholes;
 use super::rebase::rebase;
 use crate::adjust::{CameraModel, Model, Observations};
 use calib_rays::field::spline::{Spline, SplineGrid};
@@ -64,6 +66,8 @@ pub enum Alternative {
     },
     /// All cameras lose their splines.
     NoSpline,
+    /// All cameras are pinholes with the distortion of Brown and Conrady, and nothing else.
+    Pinhole,
     /// The polynomials of all directions are held at what a plain lens does, or those of one
     /// degree.
     Plain {
@@ -243,8 +247,18 @@ impl Search<'_> {
     }
 
     /// A weight of its own follows the noise of what the data hardly determine, in half of the
-    /// families. So all are held if that costs no evidence to speak of.
+    /// families. So all are held if that costs no evidence to speak of: the lenses are pinholes, or
+    /// at least plain.
     fn plain(&mut self) {
+        if are_pinholes(&self.best.fit.model) {
+            return;
+        }
+        let pinholes = pinholes(&self.best.fit, self.observations, HOPELESS_GAP);
+        if let Some(fit) = pinholes
+            && self.take_fit_if_better(Alternative::Pinhole, -NEEDED_GAIN, fit)
+        {
+            return;
+        }
         for degree in [None, Some(TILT_DEGREE)] {
             let mut fit = self.best.fit.clone();
             if fit.smoothness.hold_directions(degree)

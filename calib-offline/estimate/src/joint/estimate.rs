@@ -3,7 +3,9 @@
 use super::choice::{self, Candidate, Choice};
 use super::error::EstimateError;
 use super::evidence::{Smoothness, SmoothnessFound};
-use super::fit::Fit;
+use super::fit::{Fit, LAST};
+use super::pinhole_lens::are_pinholes;
+use super::pinholes::among_pinholes;
 use super::rebase::rebase;
 use crate::adjust::levenberg::Settings;
 use crate::adjust::robust::{StudentT, relative_weights};
@@ -26,13 +28,6 @@ const STRUCTURED: Settings = Settings {
 };
 /// How often the base lenses are fitted anew.
 const BASE_ROUNDS: usize = 2;
-/// The last adjustment. It needs two or three steps; a share of 1e-8 of the objective moves no
-/// parameter by a hundredth of its standard deviation.
-pub(super) const LAST: Settings = Settings {
-    max_iterations: 30,
-    relative_decrease: 1e-8,
-};
-
 /// Last adjustments, each with residuals taken where the one before sees the corners.
 const ANCHORS: usize = 2;
 
@@ -101,6 +96,9 @@ pub fn estimate(observations: &Observations, start: &RigStart) -> Result<Estimat
     for _ in 0..ANCHORS {
         let anchored = observations.anchored(fit.residuals());
         fit = fit.on(&anchored);
+        if are_pinholes(&fit.model) {
+            fit = among_pinholes(&fit, &anchored).unwrap_or(fit);
+        }
         fit.adjust(&anchored, LAST);
     }
     let fit = fit.on(&observations);

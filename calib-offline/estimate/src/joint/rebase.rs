@@ -30,7 +30,7 @@ pub fn rebase(model: &mut Model, observations: &Observations) {
 }
 
 /// Directions at some corners of all views, and the largest offset of any corner, px.
-fn seen_directions(
+pub(super) fn seen_directions(
     model: &Model,
     observations: &Observations,
     camera_idx: usize,
@@ -62,7 +62,7 @@ fn seen_directions(
 }
 
 /// Turns a camera's frame and, as the rig's frame is that of camera 0, everything else with that.
-fn turn_camera(model: &mut Model, camera_idx: usize, new_from_old: &Matrix3<f64>) {
+pub(super) fn turn_camera(model: &mut Model, camera_idx: usize, new_from_old: &Matrix3<f64>) {
     let turn = RigidTransform::new(*new_from_old, Vector3::zeros());
     if camera_idx > 0 {
         let camera_from_rig = &mut model.cameras[camera_idx].camera_from_rig;

@@ -3,8 +3,10 @@
 
 use super::choice::Candidate;
 use super::error::EstimateError;
-use super::estimate::{Estimate, LAST, finish};
-use super::fit::Fit;
+use super::estimate::{Estimate, finish};
+use super::fit::{Fit, LAST};
+use super::pinhole_lens::are_pinholes;
+use super::pinholes::among_pinholes;
 use crate::adjust::{Model, Observations};
 use calib_rays::board::BoardShape;
 
@@ -112,6 +114,10 @@ impl Estimate {
 /// Rounds until the evidence settles, then steps until the fit does.
 fn settled(fit: Fit, observations: &Observations) -> Result<Candidate, EstimateError> {
     let mut candidate = Candidate::settle(fit, f64::NEG_INFINITY, observations)?;
+    if are_pinholes(&candidate.fit.model) {
+        let pinholes = among_pinholes(&candidate.fit, observations);
+        candidate.fit = pinholes.unwrap_or(candidate.fit);
+    }
     candidate.fit.adjust(observations, LAST);
     Ok(candidate)
 }

@@ -4,6 +4,7 @@ pub mod base_lens;
 pub mod coverage;
 pub mod from_rays;
 pub mod knot_order;
+pub mod lattice;
 pub mod lens_fit;
 pub mod polynomial;
 pub mod projection;

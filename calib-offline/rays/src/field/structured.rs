@@ -8,14 +8,20 @@
 //! change of the half-angle vector that it makes.
 
 use super::base_lens::BaseLens;
+use super::lattice::Lattice;
 use super::polynomial::{self, Polynomial};
 use crate::geometry::{PixelPoint, SensorSize};
-use nalgebra::{DMatrix, DVector, Vector2};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
 use std::ops::RangeInclusive;
 
 /// Directions of the first kind that rotate the camera frame (two shifts of the center's
 /// direction, one turn about the axis): they are held, as poses and extrinsics can do the same.
 const GAUGE_DIRECTIONS: usize = 3;
+const GAUGE: [fn(f64, f64) -> Vector2<f64>; GAUGE_DIRECTIONS] = [
+    |_, _| Vector2::new(1.0, 0.0),
+    |_, _| Vector2::new(0.0, 1.0),
+    |x, _| Vector2::new(0.0, x),
+];
 
 /// Degrees of an offset field up to this share one smoothness weight.
 pub const OFFSET_CORE_DEGREE: usize = 3;
@@ -30,9 +36,6 @@ pub const TILT_DEGREE: usize = 0;
 /// Half-angle vectors of a lens whose decentering is that of its tangents are shorter than the root
 /// of this: 60 degrees off axis.
 const NARROW_SQUARED: f64 = 4.0 / 3.0;
-
-/// Lattice nodes along the longer side, for inner products over the sensor.
-const LATTICE: usize = 33;
 
 /// A basis of the polynomial part of a direction field.
 #[derive(Debug, Clone)]
@@ -52,23 +55,13 @@ impl StructuredBasis {
     /// that is known well; then the two directions that shift the lens are free too.
     pub fn new(sensor: SensorSize, degree: usize, lens: Option<&BaseLens>) -> Self {
         let lattice = Lattice::new(sensor, degree);
-        let mut builder = Builder {
-            lattice: &lattice,
-            orthonormal: Vec::new(),
-            penalized_degree: Vec::new(),
-        };
+        let mut builder = Builder::new(&lattice);
         // The gauge first, so that it can be cut off; then what a rotationally symmetric lens does.
-        let affine: [fn(f64, f64) -> Vector2<f64>; 6] = [
-            |_, _| Vector2::new(1.0, 0.0),
-            |_, _| Vector2::new(0.0, 1.0),
-            |x, _| Vector2::new(0.0, x),
-            |x, y| Vector2::new(x, y),
-            |x, _| Vector2::new(x, 0.0),
-            |_, y| Vector2::new(y, 0.0),
-        ];
+        let focus: fn(f64, f64) -> Vector2<f64> = |x, y| Vector2::new(x, y);
+        let sheared: [fn(f64, f64) -> Vector2<f64>; 2] =
+            [|x, _| Vector2::new(x, 0.0), |_, y| Vector2::new(y, 0.0)];
         let beyond = lens.map_or(PLAIN_DEGREE, |_| TILT_DEGREE);
         let tags = [PLAIN_DEGREE, PLAIN_DEGREE, beyond, beyond];
-        let (symmetric, sheared) = affine.split_at(GAUGE_DIRECTIONS + 1);
         let half_width_px = f64::from(sensor.width) / 2.0;
         let center = lens.map_or(Vector2::zeros(), |lens| center_in_half_widths(sensor, lens));
         // A small shift in the image, seen through the lens that is there.
@@ -79,7 +72,7 @@ impl StructuredBasis {
             }
             None => shift,
         };
-        for f in symmetric {
+        for f in GAUGE.into_iter().chain([focus]) {
             builder.add(&lattice.project(f), None);
         }
         builder.add_radial(degree, &center);
@@ -121,16 +114,70 @@ impl StructuredBasis {
         builder.finish(degree, GAUGE_DIRECTIONS)
     }
 
+    /// The basis of a lens that has a few numbers and may do nothing else: `at` gives the half-angle
+    /// vector of a pixel, and its derivative by each number, in the order of `tags`. What a number
+    /// turns is taken back by a turn of the camera's frame, as poses and extrinsics can do the same.
+    ///
+    /// `None` if too little of the sensor sees anything, or if the numbers' effects are not finite.
+    pub fn of_lens<const N: usize>(
+        sensor: SensorSize,
+        degree: usize,
+        tags: [Option<usize>; N],
+        at: impl Fn(PixelPoint) -> Option<(Vector2<f64>, [Vector2<f64>; N])>,
+    ) -> Option<Self> {
+        let (lattice, numbers) = Lattice::seen(sensor, degree, at)?;
+        let sums = |values: &dyn Fn(usize) -> Vector2<f64>| -> Vector3<f64> {
+            let all = lattice.nodes.iter().enumerate();
+            all.map(|(n, node)| (values(n), node.x))
+                .map(|(v, x)| Vector3::new(v.x, v.y, x * v.y))
+                .sum()
+        };
+        let turned = |n: usize, axis: usize| {
+            let s: Vector2<f64> = numbers[n].0;
+            if axis == 2 {
+                return Vector2::new(-s.y, s.x);
+            }
+            let mut by_turn = s * (s[axis] / 2.0);
+            by_turn[axis] += 1.0 - s.norm_squared() / 4.0;
+            by_turn
+        };
+        let by_turns = [0, 1, 2].map(|axis| sums(&|n| turned(n, axis)));
+        let by_turns = Matrix3::from_columns(&by_turns).try_inverse()?;
+        let mut builder = Builder::new(&lattice);
+        for f in GAUGE {
+            builder.add(&lattice.project(f), None);
+        }
+        for (k, tag) in tags.into_iter().enumerate() {
+            let back = by_turns * sums(&|n| numbers[n].1[k]);
+            let values: Vec<Vector2<f64>> = (0..numbers.len())
+                .map(|n| {
+                    let turns = (0..3).map(|axis| turned(n, axis) * back[axis]);
+                    numbers[n].1[k] - turns.sum::<Vector2<f64>>()
+                })
+                .collect();
+            builder.add(&lattice.project_values(&values), tag);
+        }
+        let basis = builder.finish(degree, GAUGE_DIRECTIONS);
+        basis
+            .coefficients
+            .iter()
+            .all(|c| c.is_finite())
+            .then_some(basis)
+    }
+
+    /// Whether a lens has all that there is, and no degree of the polynomial is its own.
+    pub fn is_lens_alone(&self) -> bool {
+        self.penalized_degree
+            .iter()
+            .all(|degree| degree.is_none_or(|degree| degree <= PLAIN_DEGREE))
+    }
+
     /// The basis of an offset field, mm, over a sensor: everything up to [`OFFSET_CORE_DEGREE`] as
     /// one; the radial terms `r^2k (x, y)` beyond it, k = 2 and 3, about the center of the lens, by
     /// which a pupil moves with the angle (tagged `None`); the rest by degree. Nothing is cut off.
     pub fn offset(sensor: SensorSize, degree: usize, lens: &BaseLens) -> Self {
         let lattice = Lattice::new(sensor, degree);
-        let mut builder = Builder {
-            lattice: &lattice,
-            orthonormal: Vec::new(),
-            penalized_degree: Vec::new(),
-        };
+        let mut builder = Builder::new(&lattice);
         builder.add_degrees(0..=OFFSET_CORE_DEGREE.min(degree), degree, |_| {
             OFFSET_CORE_DEGREE
         });
@@ -182,108 +229,6 @@ fn center_in_half_widths(sensor: SensorSize, lens: &BaseLens) -> Vector2<f64> {
     Vector2::from(lens.center_px) / (f64::from(sensor.width) / 2.0)
 }
 
-/// Nodes of a regular lattice over the sensor: the pixel and its offset from the image center in
-/// half widths.
-fn lattice_nodes(sensor: SensorSize) -> impl Iterator<Item = (PixelPoint, Vector2<f64>)> {
-    let (w, h) = (f64::from(sensor.width), f64::from(sensor.height));
-    let longer = w.max(h);
-    let count = |extent: f64| ((LATTICE as f64 * extent / longer).ceil() as usize).max(12);
-    let (nu, nv) = (count(w), count(h));
-    (0..nv).flat_map(move |j| {
-        (0..nu).map(move |i| {
-            let u = (i as f64 + 0.5) / nu as f64 * w - 0.5;
-            let v = (j as f64 + 0.5) / nv as f64 * h - 0.5;
-            let p = Vector2::new(u - (w / 2.0 - 0.5), v - (h / 2.0 - 0.5)) / (w / 2.0);
-            (PixelPoint::new(u, v), p)
-        })
-    })
-}
-
-/// Inner products over the sensor, in Legendre coefficients.
-struct Lattice {
-    nodes: Vec<Vector2<f64>>,
-    /// Products at the nodes, one row per node.
-    products: DMatrix<f64>,
-    /// Upper Cholesky factor U of the mean Gram matrix: `|U a|` is the RMS of the polynomial.
-    factor: DMatrix<f64>,
-    factor_inverse: DMatrix<f64>,
-}
-
-impl Lattice {
-    fn new(sensor: SensorSize, degree: usize) -> Self {
-        let (pixels, nodes): (Vec<_>, Vec<_>) = lattice_nodes(sensor).unzip();
-        let term_count = polynomial::term_count(degree);
-        let mut products = DMatrix::zeros(pixels.len(), term_count);
-        let mut row = Vec::new();
-        for (n, pixel) in pixels.iter().enumerate() {
-            polynomial::basis(sensor, degree, *pixel, &mut row);
-            for (k, [value, _, _]) in row.iter().enumerate() {
-                products[(n, k)] = *value;
-            }
-        }
-        let gram = products.tr_mul(&products) / pixels.len() as f64;
-        // Legendre products are linearly independent on any lattice denser than their degree.
-        let factor = gram.cholesky().map_or_else(
-            || DMatrix::identity(term_count, term_count),
-            |c| c.l().transpose(),
-        );
-        let factor_inverse = factor
-            .clone()
-            .try_inverse()
-            .unwrap_or_else(|| DMatrix::identity(term_count, term_count));
-        Self {
-            nodes,
-            products,
-            factor,
-            factor_inverse,
-        }
-    }
-
-    /// Legendre coefficients (`2 k + component`) of the best approximation to a function of the
-    /// offset from the image center in half widths.
-    fn project(&self, f: impl Fn(f64, f64) -> Vector2<f64>) -> DVector<f64> {
-        let values: Vec<Vector2<f64>> = self.nodes.iter().map(|p| f(p.x, p.y)).collect();
-        let mut out = DVector::zeros(2 * self.factor.nrows());
-        for component in 0..2 {
-            let sampled =
-                DVector::from_iterator(values.len(), values.iter().map(|value| value[component]));
-            let right = self.products.tr_mul(&sampled) / values.len() as f64;
-            let solved = &self.factor_inverse * (self.factor_inverse.tr_mul(&right));
-            for k in 0..solved.len() {
-                out[2 * k + component] = solved[k];
-            }
-        }
-        out
-    }
-
-    /// A shift of a lens's center along an axis with the turn of the camera frame that takes its
-    /// constant back, as constants are cut off: what a turn does besides is a tilt.
-    fn shift(&self, lens: &BaseLens, half_width_px: f64, axis: usize) -> DVector<f64> {
-        let at = |x: f64, y: f64| lens.evaluate(&(Vector2::new(x, y) * half_width_px));
-        let shifted = |x, y| at(x, y).1.column(axis) * half_width_px;
-        // Of the half-angle vector, by a turn that moves the middle along the axis.
-        let turned = |x, y| {
-            let s = at(x, y).0;
-            let mut by_turn = s * (s[axis] / 2.0);
-            by_turn[axis] += 1.0 - s.norm_squared() / 4.0;
-            by_turn
-        };
-        let sum = |f: &dyn Fn(f64, f64) -> Vector2<f64>| -> f64 {
-            self.nodes.iter().map(|p| f(p.x, p.y)[axis]).sum()
-        };
-        let back = sum(&shifted) / sum(&turned);
-        self.project(|x, y| shifted(x, y) - turned(x, y) * back)
-    }
-
-    /// Applies a square matrix to each component of interleaved coefficients.
-    fn per_component(matrix: &DMatrix<f64>, interleaved: &DVector<f64>) -> DVector<f64> {
-        let n = matrix.nrows();
-        let split = DMatrix::from_fn(n, 2, |k, c| interleaved[2 * k + c]);
-        let image = matrix * split;
-        DVector::from_fn(2 * n, |i, _| image[(i / 2, i % 2)])
-    }
-}
-
 /// Gram-Schmidt in coordinates where the sensor's inner product is Euclidean.
 struct Builder<'a> {
     lattice: &'a Lattice,
@@ -291,7 +236,15 @@ struct Builder<'a> {
     penalized_degree: Vec<Option<usize>>,
 }
 
-impl Builder<'_> {
+impl<'a> Builder<'a> {
+    fn new(lattice: &'a Lattice) -> Self {
+        Self {
+            lattice,
+            orthonormal: Vec::new(),
+            penalized_degree: Vec::new(),
+        }
+    }
+
     /// Adds what a direction has beyond those already there, if anything.
     fn add(&mut self, legendre: &DVector<f64>, penalized_degree: Option<usize>) {
         let mut rest = Lattice::per_component(&self.lattice.factor, legendre);
@@ -369,6 +322,7 @@ impl Builder<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::field::lattice::lattice_nodes;
     use crate::field::{Projection, transport};
     use crate::geometry::so3;
     use nalgebra::Vector3;
