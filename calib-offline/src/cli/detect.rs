@@ -1,6 +1,6 @@
 //! `detect`: from a dataset's images to labelled corners, with a verdict on every image.
 
-use super::detect_image::{Found, ImageObject, Verdict, camera_name, in_words};
+use super::detect_image::{Found, ImageObject, MissingObject, Verdict, camera_name, in_words};
 use super::error::Error;
 use calib_rays::observed::View;
 use calib_rays::progress::Progress;
@@ -23,10 +23,12 @@ const FORMATS: &str = "\
 Finds the board of dataset.toml in every image that is not excluded and writes
 DATASET/corners.csv (camera,pose,row,col,u,v,sigma_px). Every image gets a verdict; a refused one
 says why. The same corner has the same label in every image of every camera; what cannot be
-decided is an error. The overlay shows row 0 in orange and corner (0, 0) in a red square.
+decided is an error. The overlay shows row 0 in orange, corner (0, 0) in a red square, and an empty
+diamond where a corner of the board should be and was not found.
 
 With --json, schema calib-offline/detect/1:
-  images (camera, pose, file, verdict, corner_count, partial, quarter_turns, reason, figures (
+  images (camera, pose, file, verdict, corner_count, partial, missing_count, missing_in_view,
+    quarter_turns, reason, figures (
     contrast_percent, edge_px, square_px, residual_percent, sigma_px))
   turned (camera, pose, quarter_turns)
   pair_checks (first_camera, second_camera, poses, median_px, worst_pose, worst_px)
@@ -211,6 +213,10 @@ fn image_object(image: &ImageVerdict, camera: String) -> ImageObject<FiguresObje
         },
         found: Found::Corners(corner_count),
         partial,
+        missing: Some(MissingObject {
+            missing_count: image.missing.len(),
+            missing_in_view: image.missing.iter().filter(|c| c.pixel.is_some()).count(),
+        }),
         quarter_turns,
         reason,
         figures: image.figures.as_ref().map(FiguresObject::from),

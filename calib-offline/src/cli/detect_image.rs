@@ -32,12 +32,31 @@ pub struct ImageObject<Figures> {
     pub found: Found,
     /// Whether that is less than there is.
     pub partial: bool,
+    /// Corners of the board that were not found, and how many of them should be in the image.
+    #[serde(flatten)]
+    pub missing: Option<MissingObject>,
     /// How the labels were turned, if it is used.
     pub quarter_turns: Option<u8>,
     /// Why it is refused.
     pub reason: Option<String>,
     /// What was measured in it.
     pub figures: Option<Figures>,
+}
+
+/// What was not found of the board in an image that is used.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct MissingObject {
+    /// Corners of the board.
+    pub missing_count: usize,
+    /// Those of them whose place lies in the image.
+    pub missing_in_view: usize,
+}
+
+impl Display for MissingObject {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let (count, in_view) = (self.missing_count, self.missing_in_view);
+        write!(f, "; {count} not found, {in_view} of them in view")
+    }
 }
 
 /// Whether an image is used.
@@ -70,7 +89,8 @@ impl<Figures: Display> ImageObject<Figures> {
             (Some(reason), _) => format!("refused: {reason}"),
             (None, None) => self.found.to_string(),
             (None, Some(figures)) if self.partial => {
-                format!("{} (part of the {whole}), {figures}", self.found)
+                let missing = self.missing.map_or_else(String::new, |m| m.to_string());
+                format!("{} (part of the {whole}{missing}), {figures}", self.found)
             }
             (None, Some(figures)) => format!("{}, {figures}", self.found),
         };

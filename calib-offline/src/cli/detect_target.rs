@@ -96,6 +96,7 @@ fn image_object(image: &TargetImage, camera: String) -> ImageObject<FiguresObjec
         verdict: located.map_or(Verdict::Refused, |_| Verdict::Ok),
         found: Found::Markers(located.map_or(0, |located| located.markers.len())),
         partial: image.figures.is_some_and(|figures| figures.partial),
+        missing: None,
         quarter_turns: located.ok().map(|located| located.quarter_turns),
         reason: located.err().map(ToString::to_string),
         figures: image.figures.as_ref().map(FiguresObject::from),

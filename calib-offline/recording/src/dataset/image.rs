@@ -5,7 +5,7 @@ mod jpeg_end;
 
 use calib_rays::geometry::SensorSize;
 use calib_rays::remedy::Remedy;
-use image::{DynamicImage, ImageFormat, ImageReader};
+use image::{DynamicImage, ImageFormat, ImageReader, Rgb};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
@@ -183,17 +183,25 @@ impl GrayImage {
                 | DynamicImage::ImageRgb16(_)
                 | DynamicImage::ImageRgba16(_)
         );
-        let (values, white_level): (Vec<f32>, f32) = if deep {
-            let gray = decoded.into_luma16().into_raw();
-            let largest = gray.iter().copied().max().unwrap_or(0);
-            let white = BITS_IN_USE.into_iter().find(|white| largest <= *white);
-            let values = gray.into_iter().map(f32::from).collect();
-            (values, f32::from(white.unwrap_or(u16::MAX)))
-        } else {
-            let gray = decoded.into_luma8().into_raw();
-            let values = gray.into_iter().map(f32::from).collect();
-            (values, f32::from(u8::MAX))
-        };
+        let (values, white_level): (Vec<f32>, f32) =
+            if let DynamicImage::ImageRgb8(colors) = decoded {
+                // As the image crate's conversion, without another copy of a large image.
+                let luminance = |p: &Rgb<u8>| {
+                    let [r, g, b] = p.0.map(u32::from);
+                    ((2126 * r + 7152 * g + 722 * b + 5000) / 10_000) as f32
+                };
+                (colors.pixels().map(luminance).collect(), f32::from(u8::MAX))
+            } else if deep {
+                let gray = decoded.into_luma16().into_raw();
+                let largest = gray.iter().copied().max().unwrap_or(0);
+                let white = BITS_IN_USE.into_iter().find(|white| largest <= *white);
+                let values = gray.into_iter().map(f32::from).collect();
+                (values, f32::from(white.unwrap_or(u16::MAX)))
+            } else {
+                let gray = decoded.into_luma8().into_raw();
+                let values = gray.into_iter().map(f32::from).collect();
+                (values, f32::from(u8::MAX))
+            };
         Self {
             sensor,
             values,
@@ -226,15 +234,19 @@ impl GrayImage {
 
     /// The values below which the given fractions of the pixels lie.
     pub fn quantiles<const N: usize>(&self, fractions: [f64; N]) -> [f32; N] {
-        let mut sorted = self.values.clone();
-        sorted.sort_unstable_by(f32::total_cmp);
-        fractions.map(|f| sorted[((sorted.len() - 1) as f64 * f.clamp(0.0, 1.0)).round() as usize])
+        let mut values = self.values.clone();
+        let last = (values.len() - 1) as f64;
+        fractions.map(|fraction| {
+            let index = (last * fraction.clamp(0.0, 1.0)).round() as usize;
+            *values.select_nth_unstable_by(index, f32::total_cmp).1
+        })
     }
 
     /// The image in 8 bits, `black` and below to 0, `white` and above to 255.
     pub fn stretched(&self, black: f32, white: f32) -> Vec<u8> {
         let scale = 255.0 / (white - black).max(f32::MIN_POSITIVE);
-        let stretch = |v: &f32| ((v - black) * scale).round().clamp(0.0, 255.0) as u8;
+        // To the nearest: the conversion cuts, and stops at 0 and 255.
+        let stretch = |v: &f32| ((v - black) * scale + 0.5) as u8;
         self.values.iter().map(stretch).collect()
     }
 

@@ -12,6 +12,7 @@ use calib_targets_chessboard::{
     detect_corners,
 };
 use chess_corners::ImageRefiner;
+use std::borrow::Cow;
 
 /// A corner as the detector numbered it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,30 +36,46 @@ pub trait ChessboardDetector: Sync {
 
 /// `ChESS` corners with a saddle-point refinement, joined to a grid by their triangulation.
 ///
-/// The image is stretched to full contrast first, so that exposure does not matter, and tried at
-/// full, half and quarter size until the whole board is found: large blurred squares show their
-/// corners only in the small image. If most of the board is still missing, double size is tried:
-/// the detector needs squares of about eight pixels.
+/// The image is stretched to full contrast first, so that exposure does not matter. It is searched at
+/// full, half and quarter size until the whole board is found: large blurred squares show their corners
+/// only in the small image. A large image is searched reduced first, where most boards are found whole
+/// for a fraction of the time. If most of the board is still missing, double size is tried: the detector
+/// needs squares of about eight pixels.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ChessTopologicalDetector;
 
-/// Reduced sizes tried: half and quarter.
-const SMALLER: [Scale; 2] = [Scale(2.0), Scale(4.0)];
+/// Sizes tried: full, half and quarter.
+const SCALES: [Scale; 3] = [Scale::FULL, Scale(2.0), Scale(4.0)];
+/// Images with more pixels than this are searched at half size first, with sixteen times more at a
+/// quarter.
+const LARGE_PIXELS: usize = 600_000;
 /// Fractions of the pixels that are allowed to saturate when the image is stretched.
 const STRETCH_QUANTILES: [f64; 2] = [0.005, 0.995];
 
 impl ChessboardDetector for ChessTopologicalDetector {
     fn detect(&self, image: &GrayImage, board: &BoardSpec) -> Vec<Vec<RawCorner>> {
-        let mut best = detect_at(image, Scale::FULL);
-        let mut smaller = None;
-        for scale in SMALLER {
-            if best.iter().any(|grid| is_whole(grid, board)) {
-                return best;
+        let pixels = image.values.len();
+        let order = if pixels > 16 * LARGE_PIXELS {
+            [2, 1, 0]
+        } else if pixels > LARGE_PIXELS {
+            [1, 0, 2]
+        } else {
+            [0, 1, 2]
+        };
+        let mut found: [Vec<Vec<RawCorner>>; 3] = Default::default();
+        for step in order {
+            let Some(at_scale) = reduced(image, step) else {
+                continue;
+            };
+            let grids = detect_at(&at_scale, SCALES[step]);
+            if grids.iter().any(|grid| is_whole(grid, board)) {
+                return grids;
             }
-            smaller = smaller.as_ref().unwrap_or(image).halved();
-            let Some(at_scale) = &smaller else { break };
-            take_larger(&mut best, detect_at(at_scale, scale), board);
+            found[step] = grids;
         }
+        let [mut best, half, quarter] = found;
+        take_larger(&mut best, half, board);
+        take_larger(&mut best, quarter, board);
         if 2 * largest(&best, board) < board.corner_count()
             && let Some(double) = image.doubled()
         {
@@ -96,6 +113,13 @@ fn largest(grids: &[Vec<RawCorner>], board: &BoardSpec) -> usize {
         }
     };
     grids.iter().map(count).max().unwrap_or(0)
+}
+
+/// The image halved so often; `None` if nothing is left of it.
+fn reduced(image: &GrayImage, times: usize) -> Option<Cow<'_, GrayImage>> {
+    (0..times).try_fold(Cow::Borrowed(image), |image, _| {
+        Some(Cow::Owned(image.halved()?))
+    })
 }
 
 /// A corner more or less at another size is no reason to give up the sharper ones.

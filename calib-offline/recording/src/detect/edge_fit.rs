@@ -14,22 +14,135 @@ pub struct NormalEquations<const N: usize> {
 }
 
 impl<const N: usize> NormalEquations<N> {
-    /// From each pixel's value, and what the model says of it with the derivatives by its unknowns.
-    pub fn of(pixels: impl Iterator<Item = (f64, (f64, SVector<f64, N>))>) -> Self {
-        let mut sum = Self {
+    /// Of no pixels yet.
+    pub fn none() -> Self {
+        Self {
             normal: SMatrix::zeros(),
             right: SVector::zeros(),
             cost: 0.0,
             pixels: 0,
-        };
+        }
+    }
+
+    /// From each pixel's value, and what the model says of it with the derivatives by its unknowns.
+    pub fn of(pixels: impl Iterator<Item = (f64, (f64, SVector<f64, N>))>) -> Self {
+        let mut sum = Self::none();
         for (value, (predicted, gradient)) in pixels {
-            let residual = value - predicted;
-            sum.normal.ger(1.0, &gradient, &gradient, 1.0);
-            sum.right.axpy(residual, &gradient, 1.0);
-            sum.cost += residual * residual;
-            sum.pixels += 1;
+            sum.add(value - predicted, &gradient);
         }
         sum
+    }
+
+    /// One more pixel. Only the lower triangle is summed: no more is read.
+    #[inline]
+    pub fn add(&mut self, residual: f64, gradient: &SVector<f64, N>) {
+        for k in 0..N {
+            for i in k..N {
+                self.normal[(i, k)] += gradient[i] * gradient[k];
+            }
+        }
+        self.right.axpy(residual, gradient, 1.0);
+        self.cost += residual * residual;
+        self.pixels += 1;
+    }
+
+    /// Many pixels at once, from their own sums; of `normal`, the lower triangle counts.
+    pub fn add_sums(
+        &mut self,
+        normal: &SMatrix<f64, N, N>,
+        right: &SVector<f64, N>,
+        cost: f64,
+        pixels: usize,
+    ) {
+        self.normal += normal;
+        self.right += right;
+        self.cost += cost;
+        self.pixels += pixels;
+    }
+
+    /// The covariance of unknowns: of those that stand at a bound, or that no pixel tells anything of,
+    /// it says nothing.
+    fn inverse(
+        mut self,
+        unknowns: &SVector<f64, N>,
+        ranges: &[Range],
+    ) -> Option<SMatrix<f64, N, N>> {
+        for range in ranges {
+            let k = range.unknown;
+            if unknowns[k] <= range.least || unknowns[k] >= range.most || self.normal[(k, k)] <= 0.0
+            {
+                self.hold(k, 0.0);
+            }
+        }
+        Some(self.normal.cholesky()?.inverse())
+    }
+
+    /// The step, its diagonal enlarged by `1 + damping`. Where it would lead out of a range it leads to
+    /// the bound, and the others' steps are those that go with it.
+    fn step(
+        &self,
+        damping: f64,
+        unknowns: &SVector<f64, N>,
+        ranges: &[Range],
+    ) -> Option<SVector<f64, N>> {
+        let mut damped = *self;
+        for k in 0..N {
+            damped.normal[(k, k)] *= 1.0 + damping;
+        }
+        for range in ranges {
+            if damped.normal[(range.unknown, range.unknown)] <= 0.0 {
+                damped.hold(range.unknown, 0.0);
+            }
+        }
+        let mut step = damped.solved()?;
+        for range in ranges {
+            let k = range.unknown;
+            let within = range.clamped(unknowns[k] + step[k], unknowns[k]) - unknowns[k];
+            if within != step[k] {
+                damped.hold(k, within);
+                step = damped.solved()?;
+            }
+        }
+        Some(step)
+    }
+
+    fn solved(&self) -> Option<SVector<f64, N>> {
+        Some(self.normal.cholesky()?.solve(&self.right))
+    }
+
+    /// Sets the step of an unknown.
+    fn hold(&mut self, k: usize, step: f64) {
+        for i in 0..N {
+            let pair = (i.max(k), i.min(k));
+            self.right[i] -= self.normal[pair] * step;
+            self.normal[pair] = 0.0;
+        }
+        self.normal[(k, k)] = 1.0;
+        self.right[k] = step;
+    }
+}
+
+/// Where an unknown means something.
+#[derive(Debug, Clone, Copy)]
+pub struct Range {
+    /// Which one.
+    pub unknown: usize,
+    /// Its least value.
+    pub least: f64,
+    /// Its greatest.
+    pub most: f64,
+    /// No step makes it less than this part of what it was; 0 for one that may be.
+    pub shrink: f64,
+}
+
+impl Range {
+    fn clamped(&self, next: f64, before: f64) -> f64 {
+        let shrunk = if self.shrink > 0.0 {
+            self.shrink * before
+        } else {
+            self.least
+        };
+        next.clamp(self.least.max(shrunk).min(self.most), self.most)
     }
 }
 
@@ -54,40 +167,34 @@ pub struct Fitted<const N: usize> {
 }
 
 /// The model as a problem of Levenberg-Marquardt; a state keeps the equations that its cost came with.
-struct EdgeFit<'a, const N: usize, K, E> {
+struct EdgeFit<'a, const N: usize, E> {
     limits: &'a Limits,
-    keep_in_range: K,
+    ranges: &'a [Range],
     equations: E,
 }
 
-impl<const N: usize, K, E> Problem for EdgeFit<'_, N, K, E>
+impl<const N: usize, E> Problem for EdgeFit<'_, N, E>
 where
-    K: Fn(&mut SVector<f64, N>),
     E: Fn(&SVector<f64, N>) -> Option<NormalEquations<N>>,
 {
     type State = (SVector<f64, N>, NormalEquations<N>);
-    type Equations = NormalEquations<N>;
+    type Equations = Self::State;
     type Step = SVector<f64, N>;
 
     fn cost(&self, (_, at): &Self::State) -> f64 {
         at.cost
     }
 
-    fn linearize(&self, (_, at): &Self::State) -> Option<NormalEquations<N>> {
-        Some(*at)
+    fn linearize(&self, state: &Self::State) -> Option<Self::Equations> {
+        Some(*state)
     }
 
-    fn step(&self, equations: &NormalEquations<N>, damping: f64) -> Option<Self::Step> {
-        let mut damped = equations.normal;
-        for k in 0..N {
-            damped[(k, k)] *= 1.0 + damping;
-        }
-        Some(damped.cholesky()?.solve(&equations.right))
+    fn step(&self, (unknowns, at): &Self::Equations, damping: f64) -> Option<Self::Step> {
+        at.step(damping, unknowns, self.ranges)
     }
 
     fn moved(&self, (unknowns, _): &Self::State, step: &Self::Step) -> Option<Self::State> {
-        let mut next = unknowns + step;
-        (self.keep_in_range)(&mut next);
+        let next = unknowns + step;
         let at_next = (self.equations)(&next)?;
         Some((next, at_next))
     }
@@ -98,12 +205,11 @@ where
     }
 }
 
-/// Levenberg-Marquardt from `start`. `keep_in_range` changes unknowns that went where the model means
-/// nothing; `equations` are `None` where there is no model at all, and so is then the fit.
+/// Levenberg-Marquardt from `start`. Unknowns stay in their `ranges`; `equations` are `None` where there is no model at all, and so is then the fit.
 pub fn fit<const N: usize>(
     start: SVector<f64, N>,
     limits: &Limits,
-    keep_in_range: impl Fn(&mut SVector<f64, N>),
+    ranges: &[Range],
     equations: impl Fn(&SVector<f64, N>) -> Option<NormalEquations<N>>,
 ) -> Option<Fitted<N>> {
     let settings = levenberg::Settings {
@@ -121,7 +227,7 @@ pub fn fit<const N: usize>(
     let at_start = equations(&start)?;
     let problem = EdgeFit {
         limits,
-        keep_in_range,
+        ranges,
         equations,
     };
     let outcome = levenberg::minimize(&problem, (start, at_start), &settings);
@@ -133,7 +239,7 @@ pub fn fit<const N: usize>(
     let variance = at.cost / (count - N as f64);
     Some(Fitted {
         unknowns,
-        covariance: at.normal.cholesky()?.inverse() * variance,
+        covariance: at.inverse(&unknowns, ranges)? * variance,
         residual_rms: (at.cost / count).sqrt(),
     })
 }

@@ -2,6 +2,8 @@
 
 use super::chessboard::RawCorner;
 use super::corner_fit::{CornerGuess, FittedCorner, fit_corner};
+use super::pixel_edge::PIXEL_VARIANCE;
+use super::scatter::model_error_px;
 use crate::dataset::image::GrayImage;
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::PixelPoint;
@@ -22,6 +24,9 @@ pub struct FittedGrid {
     pub corners: BTreeMap<Node, FittedCorner>,
     /// Whether the square before node (0, 0) in both directions is dark.
     pub dark_before_origin: bool,
+    /// Standard deviation per axis that the corners have beyond what their fits predict, px; `None` if
+    /// too few are there to tell.
+    pub model_error_px: Option<f64>,
 }
 
 /// A fitted corner must not lie further from the detected one than this part of a square, and ...
@@ -30,13 +35,19 @@ const MAX_MOVE_SQUARES: f64 = 0.15;
 const MAX_MOVE_PX: f64 = 1.5;
 /// An undetected corner must lie this near to where its neighbors predict it, squares.
 const MAX_MISS_SQUARES: f64 = 0.12;
+/// One that is clearly a corner may lie farther away: near the rim of a fisheye, predictions are off ...
+const MAX_CLEAR_MISS_SQUARES: f64 = 0.3;
+/// ... and clear means residuals of this part of the amplitude at most.
+const CLEAR_RESIDUAL_OF_AMPLITUDE: f64 = 0.3;
 /// So far an image must reach into the squares around an undetected corner, squares.
 const REACH_SQUARES: f64 = 0.2;
 /// Contrast of a corner against the median of the image: less is a shadow, or no corner.
 const MIN_AMPLITUDE_OF_MEDIAN: f64 = 0.3;
+/// With this contrast a corner is clearly one.
+const CLEAR_AMPLITUDE_OF_MEDIAN: f64 = 0.7;
 /// RMS residual against amplitude. A T-junction, where the board ends, has about 0.5.
 const MAX_RESIDUAL_OF_AMPLITUDE: f64 = 0.4;
-/// Corners that scatter more than this factor above the median ...
+/// Corners whose fits predict more than this factor of the median's scatter ...
 const MAX_SIGMA_OF_MEDIAN: f64 = 4.0;
 /// ... and more than this are dropped, px: on rendered images they are off by up to a pixel, the
 /// others by less than 0.1 px.
@@ -56,6 +67,7 @@ impl FittedGrid {
     ) -> Option<Self> {
         let rough = without_strays(right_handed(raw), board);
         let mut fitted = BTreeMap::new();
+        let mut blur_px = CornerGuess::BLUR_PX;
         for (&node, &pixel) in &rough {
             let Some(px_from_square) = px_from_square(&rough, node) else {
                 continue;
@@ -63,17 +75,21 @@ impl FittedGrid {
             let guess = CornerGuess {
                 pixel,
                 px_from_square,
+                blur_px,
             };
             let limit = MAX_MOVE_PX + MAX_MOVE_SQUARES * shorter_side(&px_from_square);
             if let Some(corner) = fit_corner(image, &guess, max_half_window_px)
                 && corner.moved_px <= limit
             {
+                // One that failed must not mislead those after it.
+                blur_px = corner.lens_blur_px.min(2.0 * CornerGuess::BLUR_PX);
                 fitted.insert(node, corner);
             }
         }
         let mut grid = Self {
             dark_before_origin: majority_is_dark(&fitted),
             corners: fitted,
+            model_error_px: None,
         };
         let Typical { amplitude, .. } = grid.typical()?;
         let dark = grid.dark_before_origin;
@@ -81,7 +97,10 @@ impl FittedGrid {
             .retain(|&node, corner| is_board_corner(node, corner, dark, amplitude));
         grid.complete(image, board, max_half_window_px);
         let Typical { sigma_px, .. } = grid.typical()?;
-        let limit_px = (MAX_SIGMA_OF_MEDIAN * sigma_px).max(MIN_SIGMA_LIMIT_PX);
+        let square_px = grid.square_px()?;
+        grid.model_error_px = model_error_px(&grid.corners, square_px);
+        let scatter_px = sigma_px.hypot(grid.model_error_px.unwrap_or(0.0));
+        let limit_px = (MAX_SIGMA_OF_MEDIAN * scatter_px).max(MIN_SIGMA_LIMIT_PX);
         grid.corners.retain(|_, corner| corner.sigma_px <= limit_px);
         (grid.corners.len() >= 4).then_some(grid)
     }
@@ -114,6 +133,18 @@ impl FittedGrid {
         })
     }
 
+    /// Standard deviation per axis of one of the corners, px; `unknown_px` is what fits leave out where
+    /// the image itself does not tell.
+    pub fn sigma_px(&self, corner: &FittedCorner, unknown_px: f64) -> f64 {
+        let model_error_px = self.model_error_px.unwrap_or(unknown_px);
+        corner.sigma_px.hypot(model_error_px)
+    }
+
+    /// The median of [`FittedGrid::sigma_px`]; `None` without corners.
+    pub fn typical_sigma_px(&self, unknown_px: f64) -> Option<f64> {
+        median(self.corners.values().map(|c| self.sigma_px(c, unknown_px)))
+    }
+
     /// The image of one square at a node; see [`CornerGuess::px_from_square`].
     pub fn px_from_square(&self, node: Node) -> Option<Matrix2<f64>> {
         px_from_square(&self.pixels(), node)
@@ -131,6 +162,33 @@ impl FittedGrid {
     /// The corners' places alone.
     pub fn pixels(&self) -> BTreeMap<Node, PixelPoint> {
         self.corners.iter().map(|(&n, c)| (n, c.pixel)).collect()
+    }
+
+    /// The corners' places, and beside them those that lines through them predict, as far as the
+    /// board may reach.
+    pub fn extended(&self, board: &BoardSpec) -> BTreeMap<Node, PixelPoint> {
+        let mut pixels = self.pixels();
+        let (low, high) = self.extent();
+        let longer = board.rows.max(board.cols) as i32 - 1;
+        let reaches = |(i, j): Node| {
+            (high.0 - longer..=low.0 + longer).contains(&i)
+                && (high.1 - longer..=low.1 + longer).contains(&j)
+        };
+        loop {
+            let missing: BTreeSet<Node> = pixels
+                .keys()
+                .flat_map(|&node| NEIGHBORS.map(|step| plus(node, step, 1)))
+                .filter(|node| !pixels.contains_key(node) && reaches(*node))
+                .collect();
+            let near: Vec<(Node, PixelPoint)> = missing
+                .iter()
+                .filter_map(|&node| Some((node, predicted(&pixels, node)?.0)))
+                .collect();
+            if near.is_empty() {
+                return pixels;
+            }
+            pixels.extend(near);
+        }
     }
 
     /// Fits the corners that the neighbors predict and the detector missed, as far as the board
@@ -174,12 +232,20 @@ impl FittedGrid {
         let guess = CornerGuess {
             pixel,
             px_from_square,
+            blur_px: typical.lens_blur_px().min(2.0 * CornerGuess::BLUR_PX),
         };
         if !shows_four_squares(image, &guess) {
             return None;
         }
         let corner = fit_corner(image, &guess, max_half_window_px)?;
-        let near = corner.moved_px <= MAX_MISS_SQUARES * shorter_side(&px_from_square);
+        let is_clear = corner.amplitude.abs() >= CLEAR_AMPLITUDE_OF_MEDIAN * typical.amplitude
+            && corner.residual_rms <= CLEAR_RESIDUAL_OF_AMPLITUDE * corner.amplitude.abs();
+        let miss_squares = if is_clear {
+            MAX_CLEAR_MISS_SQUARES
+        } else {
+            MAX_MISS_SQUARES
+        };
+        let near = corner.moved_px <= miss_squares * shorter_side(&px_from_square);
         let as_sharp = corner.blur_px <= 2.0 * typical.blur_px + 0.5;
         let genuine = is_board_corner(node, &corner, self.dark_before_origin, typical.amplitude);
         (near && as_sharp && genuine).then_some(corner)
@@ -215,6 +281,13 @@ pub struct Typical {
     pub residual_rms: f64,
     /// Standard deviation of a corner per axis, px.
     pub sigma_px: f64,
+}
+
+impl Typical {
+    /// Standard deviation of the lens's blur alone, px.
+    fn lens_blur_px(&self) -> f64 {
+        (self.blur_px.powi(2) - PIXEL_VARIANCE).max(0.0).sqrt()
+    }
 }
 
 /// The neighbors of a node along both directions.
@@ -313,8 +386,14 @@ fn is_board_corner(
 ) -> bool {
     let sign = if dark_before_origin { 1.0 } else { -1.0 };
     let amplitude = corner.amplitude * sign * node_sign(node);
+    // With most of its contrast it is no T-junction, which has half of it.
+    let of_amplitude = if amplitude >= CLEAR_AMPLITUDE_OF_MEDIAN * typical_amplitude {
+        amplitude.max(typical_amplitude)
+    } else {
+        amplitude
+    };
     amplitude >= MIN_AMPLITUDE_OF_MEDIAN * typical_amplitude
-        && corner.residual_rms <= MAX_RESIDUAL_OF_AMPLITUDE * amplitude
+        && corner.residual_rms <= MAX_RESIDUAL_OF_AMPLITUDE * of_amplitude
 }
 
 fn vector(from: PixelPoint, to: PixelPoint) -> Vector2<f64> {
@@ -373,8 +452,8 @@ fn missing_neighbors(pixels: &BTreeMap<Node, PixelPoint>, board: &BoardSpec) -> 
     missing
 }
 
-/// Where a missing corner should be, from straight lines through its neighbors, and the image of
-/// a square there.
+/// Where a missing corner should be, from lines through its neighbors, bent where there are enough of
+/// them to tell, and the image of a square there.
 fn predicted(
     pixels: &BTreeMap<Node, PixelPoint>,
     node: Node,
@@ -387,14 +466,20 @@ fn predicted(
             continue;
         };
         axes = axes.or_else(|| px_from_square(pixels, plus(node, step, 1)));
-        let point = if let Some(&opposite) = pixels.get(&plus(node, step, -1)) {
-            Vector2::new(near.u + opposite.u, near.v + opposite.v) / 2.0
-        } else if let Some(&far) = pixels.get(&plus(node, step, 2)) {
-            Vector2::new(2.0 * near.u - far.u, 2.0 * near.v - far.v)
-        } else {
-            continue;
+        let place = |times: i32| {
+            let at = pixels.get(&plus(node, step, times));
+            at.map(|p| Vector2::new(p.u, p.v))
         };
-        sum += point;
+        let near = Vector2::new(near.u, near.v);
+        sum += match (place(-1), place(2), place(-2), place(3)) {
+            (Some(opposite), Some(far), Some(far_opposite), _) => {
+                ((near + opposite) * 4.0 - far - far_opposite) / 6.0
+            }
+            (Some(opposite), ..) => (near + opposite) / 2.0,
+            (None, Some(far), _, Some(farthest)) => (near - far) * 3.0 + farthest,
+            (None, Some(far), ..) => near * 2.0 - far,
+            _ => continue,
+        };
         count += 1.0;
     }
     let mean = sum / count;

@@ -24,6 +24,13 @@ impl Placement {
         ((y + self.row_shift) as usize, (x + self.col_shift) as usize)
     }
 
+    /// Whether a node, one of the grid or not, is on the board.
+    pub fn is_on_board(&self, node: Node, board: &BoardSpec) -> bool {
+        let (x, y) = turned(node, self.quarter_turns);
+        (0..board.cols as i32).contains(&(x + self.col_shift))
+            && (0..board.rows as i32).contains(&(y + self.row_shift))
+    }
+
     /// Whether the square before corner (0, 0) of the board, towards negative x and y, is dark.
     pub fn dark_before_first_corner(&self, grid: &FittedGrid) -> bool {
         let steps = self.col_shift + self.row_shift + i32::from(self.quarter_turns);

@@ -1,7 +1,7 @@
 //! From images to labelled corners.
 //!
 //! Per image: rough grid of corners ([`chessboard`]), sub-pixel fit and completion ([`grid`],
-//! [`corner_fit`]), possible places on the board ([`labelling`], [`border`]). Over all images:
+//! [`corner_fit`]), their scatter, possible places on the board ([`labelling`], [`border`]). Over all images:
 //! the same label for the same corner ([`consistency`], [`epipolar`]). Every image gets a verdict
 //! ([`verdict`]).
 //!
@@ -24,7 +24,9 @@ mod job;
 pub mod labelling;
 pub mod overlay;
 mod pair_check;
+mod pixel_edge;
 pub mod ring_target;
+mod scatter;
 mod settings;
 pub mod turning;
 pub mod verdict;
@@ -51,7 +53,9 @@ use labelling::{Placement, placements};
 use pair_check::pair_checks;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use verdict::{ImageFigures, ImageVerdict, Outcome, Refusal, why_not_placed, why_nothing_found};
+use verdict::{
+    ImageFigures, ImageVerdict, MissingCorner, Outcome, Refusal, why_not_placed, why_nothing_found,
+};
 
 /// What one image shows by itself.
 struct Inspected {
@@ -103,8 +107,23 @@ pub fn detect_dataset_with(
         })
         .collect();
     progress.end();
-    let inspected = all_loaded(dataset, &jobs, loaded)?;
+    let mut inspected = all_loaded(dataset, &jobs, loaded)?;
     check_count(&dataset.board, &inspected)?;
+    for camera_idx in 0..dataset.cameras.len() {
+        let of_camera = jobs.iter().zip(&mut inspected);
+        let of_camera = of_camera.filter(|(job, _)| job.camera_idx == camera_idx);
+        let mut found: Vec<&mut Inspected> = of_camera
+            .filter_map(|(_, found)| found.as_mut().ok())
+            .collect();
+        scatter::pool(found.iter_mut().map(|found| &mut found.grid.model_error_px));
+        for Inspected { figures, grid, .. } in found {
+            if let (Some(figures), Some(sigma_px)) =
+                (figures, grid.typical_sigma_px(settings.sigma_floor_px))
+            {
+                figures.sigma_px = sigma_px;
+            }
+        }
+    }
 
     let mut figures = Vec::new();
     let mut refusals: Vec<Option<Refusal>> = Vec::new();
@@ -134,11 +153,13 @@ pub fn detect_dataset_with(
     let mut images = Vec::new();
     let mut settled = settled.into_iter();
     for ((job, refusal), figures) in jobs.iter().zip(refusals).zip(figures) {
+        let mut missing = Vec::new();
         let outcome = match refusal {
             Some(refusal) => Outcome::Refused(refusal),
             None => match settled.next() {
                 Some((view, Some(placement))) => {
                     views.push(labelled_view(&view, &placement, settings));
+                    missing = MissingCorner::of(&view.grid, &placement, &dataset.board, job.sensor);
                     used(&view, &placement, &dataset.board)
                 }
                 Some((view, None)) => Outcome::Refused(not_settled(&view, figures.as_ref())),
@@ -151,6 +172,7 @@ pub fn detect_dataset_with(
             path: job.path.clone(),
             outcome,
             figures,
+            missing,
         });
     }
     Ok(Detection {
@@ -304,7 +326,7 @@ fn labelled_view(view: &UnsettledView, placement: &Placement, settings: &DetectS
                 row,
                 col,
                 pixel: corner.pixel,
-                sigma_px: Some(corner.sigma_px.hypot(settings.sigma_floor_px)),
+                sigma_px: Some(view.grid.sigma_px(corner, settings.sigma_floor_px)),
             }
         })
         .collect();

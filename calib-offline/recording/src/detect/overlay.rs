@@ -1,9 +1,10 @@
 //! The image with what was found in it drawn over: for people to check the labels.
 
 use super::Detection;
-use super::verdict::{ImageVerdict, Outcome};
+use super::verdict::{ImageVerdict, MissingCorner, Outcome};
 use crate::dataset::Dataset;
 use crate::dataset::image::GrayImage;
+use calib_rays::geometry::PixelPoint;
 use calib_rays::in_order;
 use calib_rays::observed::{Corner, View};
 use calib_rays::progress::Progress;
@@ -16,6 +17,7 @@ const FIRST: Rgb<u8> = Rgb([255, 60, 60]);
 const ROW_ZERO: Rgb<u8> = Rgb([255, 160, 0]);
 const OTHER: Rgb<u8> = Rgb([0, 220, 90]);
 const EDGE: Rgb<u8> = Rgb([80, 160, 255]);
+const MISSING: Rgb<u8> = Rgb([255, 0, 255]);
 const REFUSED: Rgb<u8> = Rgb([255, 0, 0]);
 
 /// Pixels of the overlay per pixel of a small image, so that digits can be read.
@@ -24,8 +26,9 @@ const ENLARGED_BELOW_PX: u32 = 1000;
 const ELLIPSE_SIDES: u32 = 72;
 
 /// The image, each row of corners joined by a line: row 0 orange, the first corner a red square, a
-/// dot on every other, row and column numbers at the rows' and columns' beginnings. A refused
-/// image is framed in red.
+/// dot on every other, row and column numbers at the rows' and columns' beginnings. An empty diamond
+/// stands where a corner of the board should be and was not found; how many these are is at the top
+/// left. A refused image is framed in red.
 pub fn draw(image: &GrayImage, view: Option<&View>, verdict: &ImageVerdict) -> RgbImage {
     let mut canvas = Canvas::new(image);
     if matches!(verdict.outcome, Outcome::Refused(_)) {
@@ -34,6 +37,7 @@ pub fn draw(image: &GrayImage, view: Option<&View>, verdict: &ImageVerdict) -> R
     if let Some(view) = view {
         canvas.corners(&view.corners);
     }
+    canvas.missing(&verdict.missing);
     canvas.image
 }
 
@@ -97,6 +101,21 @@ impl Canvas {
                 let above = (at.0 + 4.0, at.1 - 18.0);
                 number(&mut self.image, above, corner.col, color);
             }
+        }
+    }
+
+    /// Corners that were not found: a diamond on each in the image, and their number.
+    fn missing(&mut self, missing: &[MissingCorner]) {
+        let places: Vec<PixelPoint> = missing.iter().filter_map(|c| c.pixel).collect();
+        for pixel in &places {
+            let at = self.place(pixel.u, pixel.v);
+            diamond(&mut self.image, at, MISSING);
+        }
+        if !places.is_empty() {
+            let legend = (2.0 * DIAMOND_PX, 2.0 * DIAMOND_PX);
+            diamond(&mut self.image, legend, MISSING);
+            let beside = (legend.0 + 2.0 * DIAMOND_PX, legend.1 - 2.5 * DOT_PX as f64);
+            number(&mut self.image, beside, places.len(), MISSING);
         }
     }
 
@@ -235,6 +254,24 @@ fn square(canvas: &mut RgbImage, at: (f64, f64), half: i64, color: Rgb<u8>) {
         for side in [-half, half] {
             put(canvas, u + k, v + side, color);
             put(canvas, u + side, v + k, color);
+        }
+    }
+}
+
+/// From the middle of a diamond to its corners, px.
+const DIAMOND_PX: f64 = 7.0;
+
+fn diamond(canvas: &mut RgbImage, (u, v): (f64, f64), color: Rgb<u8>) {
+    // Two lines wide.
+    for reach in [DIAMOND_PX, DIAMOND_PX - 1.0] {
+        let tips = [
+            (u - reach, v),
+            (u, v - reach),
+            (u + reach, v),
+            (u, v + reach),
+        ];
+        for k in 0..4 {
+            line(canvas, tips[k], tips[(k + 1) % 4], color);
         }
     }
 }

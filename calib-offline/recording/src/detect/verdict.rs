@@ -4,8 +4,11 @@ use super::border::Borders;
 use super::grid::{FittedGrid, Typical};
 use super::grid_size::GridSize;
 use super::illegible::{EDGE_WIDTH_OF_BLUR, Illegible, Shown};
+use super::labelling::Placement;
 use crate::dataset::image::GrayImage;
 use calib_rays::board::BoardSpec;
+use calib_rays::geometry::{PixelPoint, SensorSize};
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 /// The verdict on one image.
@@ -21,6 +24,49 @@ pub struct ImageVerdict {
     pub outcome: Outcome,
     /// What was measured, if a board was found.
     pub figures: Option<ImageFigures>,
+    /// The board's corners that were not found, if it is used.
+    pub missing: Vec<MissingCorner>,
+}
+
+/// A corner of the board that was not found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MissingCorner {
+    /// Row on the board.
+    pub row: usize,
+    /// Column on the board.
+    pub col: usize,
+    /// Where it must be for those that were found; `None` if that is outside the image.
+    pub pixel: Option<PixelPoint>,
+}
+
+impl MissingCorner {
+    /// The board's corners that a placed grid lacks, by row and column.
+    pub fn of(
+        grid: &FittedGrid,
+        placement: &Placement,
+        board: &BoardSpec,
+        sensor: SensorSize,
+    ) -> Vec<Self> {
+        let found = grid.corners.keys().map(|&node| placement.row_col(node));
+        let found: BTreeSet<(usize, usize)> = found.collect();
+        let predicted: BTreeMap<(usize, usize), PixelPoint> = grid
+            .extended(board)
+            .into_iter()
+            .filter(|&(node, _)| placement.is_on_board(node, board))
+            .map(|(node, pixel)| (placement.row_col(node), pixel))
+            .collect();
+        let all = (0..board.rows).flat_map(|row| (0..board.cols).map(move |col| (row, col)));
+        all.filter(|label| !found.contains(label))
+            .map(|(row, col)| Self {
+                row,
+                col,
+                pixel: predicted
+                    .get(&(row, col))
+                    .copied()
+                    .filter(|&pixel| sensor.contains(pixel)),
+            })
+            .collect()
+    }
 }
 
 /// What became of an image.
@@ -103,7 +149,7 @@ pub struct ImageFigures {
     pub square_px: f64,
     /// RMS residual of the corner fits, percent of the contrast.
     pub residual_percent: f64,
-    /// Standard deviation of a corner per axis, px, predicted from the residuals.
+    /// Standard deviation of a corner per axis, px, predicted from the residuals and the scatter.
     pub sigma_px: f64,
 }
 
@@ -121,7 +167,7 @@ impl ImageFigures {
             amplitude,
             blur_px,
             residual_rms,
-            sigma_px,
+            ..
         } = grid.typical()?;
         Some(Self {
             corner_count: grid.corners.len(),
@@ -129,7 +175,7 @@ impl ImageFigures {
             edge_px: EDGE_WIDTH_OF_BLUR * blur_px,
             square_px: grid.square_px()?,
             residual_percent: 50.0 * residual_rms / amplitude,
-            sigma_px,
+            sigma_px: grid.typical_sigma_px(0.0)?,
         })
     }
 }

@@ -18,7 +18,7 @@ use super::ring_model::{
     AROUND, BLUR, COUNT, Edge, EdgeOffsets, PRINT, Parameters, RATIO, RingModel,
 };
 use crate::dataset::image::GrayImage;
-use crate::detect::edge_fit::{Fitted, Limits, NormalEquations, fit};
+use crate::detect::edge_fit::{Fitted, Limits, NormalEquations, Range, fit};
 use calib_rays::geometry::PixelPoint;
 use nalgebra::{Matrix2, Vector2};
 
@@ -226,11 +226,14 @@ impl Window {
 
     /// `None` where the equations determine no ring.
     fn solve(&self, start: RingModel, offsets: &EdgeOffsets) -> Option<Fitted<COUNT>> {
-        let keep_in_range = |unknowns: &mut Parameters| {
-            unknowns[BLUR] = unknowns[BLUR].clamp(BLUR_RANGE_PX.0, BLUR_RANGE_PX.1);
-            unknowns[RATIO] = unknowns[RATIO].clamp(RATIO_RANGE.0, RATIO_RANGE.1);
+        let range = |unknown, (least, most)| Range {
+            unknown,
+            least,
+            most,
+            shrink: 0.0,
         };
-        let fitted = fit(start.0, &LIMITS, keep_in_range, |unknowns| {
+        let ranges = [range(BLUR, BLUR_RANGE_PX), range(RATIO, RATIO_RANGE)];
+        let fitted = fit(start.0, &LIMITS, &ranges, |unknowns| {
             let edges = RingModel(*unknowns).edges(offsets)?;
             let pixels = self.pixels.iter();
             Some(NormalEquations::of(

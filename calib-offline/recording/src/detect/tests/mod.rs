@@ -2,7 +2,9 @@
 
 mod accuracy;
 mod datasets;
+mod exact;
 mod photo;
+mod sharp;
 mod single;
 
 use photo::{Photo, tilted};
