@@ -110,7 +110,7 @@ fn estimate(scene: &Scene, views: &[View]) -> Result<Estimate> {
 
 fn observations(scene: &Scene, views: &[View]) -> Observations {
     let sensors = scene.cameras.iter().map(CameraOptics::sensor).collect();
-    Observations::new(scene.settings.board, sensors, views)
+    Observations::new(scene.settings.board.clone(), sensors, views)
 }
 
 /// The cost of a round with splines of different grids.
@@ -216,7 +216,7 @@ fn half_angle_rad(estimate: &Estimate) -> f64 {
 
 /// All corners of each view row by row; a corner that was not seen has no level.
 fn write_vnl(scene: &Scene, views: &[View], path: &Path) -> Result<()> {
-    let board = scene.settings.board;
+    let board = scene.settings.board.clone();
     let mut text = String::from("# filename x y level\n");
     for view in views {
         for row in 0..board.rows {

@@ -99,11 +99,7 @@ fn scene(optics: OpticsKind, sensor: SensorSize, motion: Motion, outlier_share: 
     };
     settings.placements = 1;
     settings.angles_deg = (0..count).map(|k| k as f64).collect();
-    settings.board = BoardSpec {
-        rows: 7,
-        cols: 9,
-        square_mm: 15.0,
-    };
+    settings.board = BoardSpec::chessboard(7, 9, 15.0);
     let mut scene = Scene::new(settings).expect("the settings are in range");
     let reach = match optics {
         OpticsKind::Fisheye => 0.9,
@@ -138,7 +134,11 @@ struct Found {
 /// Turns between poses against the truth: free of the choice of a camera's frame.
 fn judge(scene: &Scene) -> Result<Found, calib_estimate::init::InitError> {
     let sensors = scene.cameras.iter().map(CameraOptics::sensor).collect();
-    let observations = Observations::new(scene.settings.board, sensors, &scene.observe_corners());
+    let observations = Observations::new(
+        scene.settings.board.clone(),
+        sensors,
+        &scene.observe_corners(),
+    );
     let start = start_rig(&observations)?;
     let placed: Vec<(RigidTransform, RigidTransform)> = start
         .observations

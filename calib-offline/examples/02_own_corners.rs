@@ -15,7 +15,7 @@ use std::error::Error;
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     // In place of a detector: a simulated stage seen by two cameras, 0.05 px of noise.
     let scene = Scene::new(SceneSettings::standard_noisy(OpticsKind::Brown, 1))?;
-    let board = scene.settings.board;
+    let board = scene.settings.board.clone();
     let sensors = vec![scene.cameras[0].sensor(), scene.cameras[1].sensor()];
     let views: Vec<View> = scene.observe_corners().iter().map(your_view).collect();
 

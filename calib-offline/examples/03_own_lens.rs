@@ -41,7 +41,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
 
     let views = scene.observe_corners();
     let sensors = scene.cameras.iter().map(CameraOptics::sensor).collect();
-    let observations = Observations::new(scene.settings.board, sensors, &views);
+    let observations = Observations::new(scene.settings.board.clone(), sensors, &views);
     let start = start_rig(&observations)?;
     let rig = estimate(&start.observations, &start)?.rig(&["left".to_owned(), "right".to_owned()]);
 

@@ -25,7 +25,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
 
     let views = scene.observe_corners();
     let sensors = scene.cameras.iter().map(CameraOptics::sensor).collect();
-    let observations = Observations::new(scene.settings.board, sensors, &views);
+    let observations = Observations::new(scene.settings.board.clone(), sensors, &views);
     let start = start_rig(&observations)?;
     let names: Vec<String> = scene.names.iter().map(|name| (*name).to_owned()).collect();
     let rig = estimate(&start.observations, &start)?.rig(&names);

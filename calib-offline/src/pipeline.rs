@@ -25,7 +25,7 @@ use crate::methods::{Given, Joint, Method, Own, fit_folds};
 use crate::report::Calibration;
 use calib_estimate::adjust::Observations;
 use calib_judge::agreement::{Whole, agreement};
-use calib_judge::half_data::splits;
+use calib_judge::half_data::first_halves;
 use calib_judge::held_out::folds_wanted;
 use calib_judge::plausibility::Sheet;
 use calib_judge::screened::screened;
@@ -187,13 +187,20 @@ pub fn calibrate_corners(
 
     let used = &solution.observations;
     let folds = folds_wanted(used, settings.folds);
-    let halves = splits(used.poses.iter().copied(), |pose| {
-        given.placements.get(&pose).copied()
-    });
+    let halves = first_halves(used, |pose| given.placements.get(&pose).copied());
     let halves: &[_] = if settings.folds > 0 { &halves } else { &[] };
     progress.begin("cross-checks", folds);
     let (folds, (checks, causes)) = rayon::join(
-        || fit_folds(settings.method, &given, used, folds, progress),
+        || {
+            fit_folds(
+                settings.method,
+                &given,
+                used,
+                folds,
+                Some(&*solution.own),
+                progress,
+            )
+        },
         || {
             rayon::join(
                 || solution.own.check(&solution.rig, halves),

@@ -37,11 +37,7 @@ pub fn data(name: &str) -> PathBuf {
 pub fn small_scene(optics: OpticsKind, seed: u64) -> Scene {
     let settings = SceneSettings {
         sensor: SensorSize::new(640, 480),
-        board: BoardSpec {
-            rows: 10,
-            cols: 9,
-            square_mm: 12.0,
-        },
+        board: BoardSpec::chessboard(10, 9, 12.0),
         spread: 0.3,
         angles_deg: (-3..=3).map(|k| f64::from(k) * 11.0).collect(),
         ..SceneSettings::standard(optics, seed)

@@ -39,11 +39,7 @@ const BASELINE_MM: f64 = 124.0;
 pub fn scene(boards: &Boards, seed: u64) -> Result<Scene, SceneError> {
     let mut settings = SceneSettings::standard_noisy(OpticsKind::Brown, seed);
     let [rows, cols] = boards.corners;
-    settings.board = BoardSpec {
-        rows,
-        cols,
-        square_mm: 23.0 * 9.0 / (cols - 1) as f64,
-    };
+    settings.board = BoardSpec::chessboard(rows, cols, 23.0 * 9.0 / (cols - 1) as f64);
     settings.placements = 1;
     settings.angles_deg = vec![0.0; boards.count];
     let sensor = SensorSize::new(1280, 1024);

@@ -55,7 +55,11 @@ mod tests {
         settings.angles_deg = (-3..=3).map(|k| f64::from(k) * 13.0).collect();
         let scene = Scene::new(settings).unwrap();
         let sensors = scene.cameras.iter().map(CameraOptics::sensor).collect();
-        let seen = Observations::new(scene.settings.board, sensors, &scene.observe_corners());
+        let seen = Observations::new(
+            scene.settings.board.clone(),
+            sensors,
+            &scene.observe_corners(),
+        );
         let start = start_rig(&seen).unwrap();
         let found = estimate(&start.observations, &start).unwrap();
         let rig = found.rig(&seen.numbered_cameras());

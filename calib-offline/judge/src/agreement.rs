@@ -4,7 +4,7 @@
 
 use super::held_out::{Fold, Folds};
 use calib_estimate::adjust::Observations;
-use calib_estimate::adjust::observations::ViewBlock;
+use calib_estimate::adjust::observations::{ObservedCorner, ViewBlock};
 use calib_estimate::adjust::robust::StudentT;
 use calib_estimate::init::board_pose::{residuals_with_free_pose, residuals_with_one_pose};
 use calib_estimate::joint::correlation::{effective_share, neighbor_correlation};
@@ -16,6 +16,7 @@ use nalgebra::Vector2;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
 
 /// Standard deviations of the intervals: 999 of 1000 cases lie within.
 pub const BY_CHANCE_SD: f64 = 3.29;
@@ -202,16 +203,25 @@ impl Whole<'_> {
         let unseen = &fold.unseen;
         let own =
             |view: &ViewBlock, poses: &Observations| (view.camera_idx, poses.poses[view.pose_idx]);
+        let label = |corner: &ObservedCorner| (corner.row, corner.col);
         let views = unseen.views.iter().map(|view| {
             let here = self.observations.views.iter().position(|other| {
                 own(other, self.observations) == own(view, unseen)
-                    && other.corners.len() == view.corners.len()
+                    && other.corners.len() >= view.corners.len()
             });
-            let is_used = here.and_then(|idx| self.is_used.get(idx));
+            let used: HashSet<(usize, usize)> = here
+                .map(|idx| {
+                    let corners = self.observations.views[idx].corners.iter();
+                    let is_used = corners.zip(&self.is_used[idx]);
+                    is_used.filter(|(_, used)| **used).map(|(c, _)| label(c))
+                })
+                .into_iter()
+                .flatten()
+                .collect();
             let coverage = &fold.rig.cameras[view.camera_idx].coverage;
             seen(view, |idx| {
-                is_used.is_some_and(|is_used| is_used[idx])
-                    && coverage.contains(view.corners[idx].pixel)
+                let corner = &view.corners[idx];
+                used.contains(&label(corner)) && coverage.contains(corner.pixel)
             })
         });
         Selected {

@@ -52,8 +52,11 @@ pub fn central_model(estimate: &Estimate, rig: &Rig, matches: &[Match]) -> Centr
 /// What offsets would have gained a rig that ended without them.
 fn offsets_gain(choices: &[Choice]) -> Option<f64> {
     let mut offered = choices.iter().filter(|choice| {
-        use Alternative::{Offsets, OffsetsFirst, OffsetsForSpline};
-        matches!(choice.tried, Offsets | OffsetsFirst | OffsetsForSpline)
+        use Alternative::{Offsets, OffsetsAfresh, OffsetsFirst, OffsetsForSpline};
+        matches!(
+            choice.tried,
+            Offsets | OffsetsAfresh | OffsetsFirst | OffsetsForSpline
+        )
     });
     if !offered.clone().any(|choice| choice.taken) {
         // Of several offers the later stands: the earlier was against a spline.

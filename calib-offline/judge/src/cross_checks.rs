@@ -2,14 +2,15 @@
 
 use super::central_model::{CentralModel, central_model};
 use super::centrality::{Centrality, centrality};
-use super::half_data::{HalfData, HalfDataCheck, Halves, Skipped, Split, estimate_halves};
+use super::half_data::{
+    FirstHalf, HalfData, HalfDataCheck, Halves, Skipped, Split, estimate_halves,
+};
 use super::working_volume::{matches_at, span};
 use calib_estimate::joint::Estimate;
 use calib_rays::field::Rig;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
 
 /// What the checks found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -44,11 +45,7 @@ impl CrossChecks {
 /// halves are not wanted.
 ///
 /// Cost: at most one estimate's a split, in parallel.
-pub fn cross_check(
-    estimate: &Estimate,
-    rig: &Rig,
-    splits: &[(Split, BTreeSet<usize>)],
-) -> CrossChecks {
+pub fn cross_check(estimate: &Estimate, rig: &Rig, splits: &[(Split, FirstHalf)]) -> CrossChecks {
     let distances = span(&estimate.board_distances_mm(rig));
     let (central_model, halves) = rayon::join(
         || central_model(estimate, rig, &matches_at(rig, &distances)),

@@ -14,7 +14,9 @@
 //! ports, 0.72 with weak and 0.60 with strong local distortion.
 
 use super::agreement::BY_CHANCE_SD;
+use super::held_out::Dealt;
 use super::working_volume::{Match, compare, lattice, matches_at};
+use calib_estimate::adjust::Observations;
 use calib_estimate::joint::Estimate;
 use calib_estimate::joint::point_covariance::{across_motions, without_motions};
 use calib_rays::field::{RayField, Rig, transport};
@@ -124,6 +126,15 @@ impl HalfData {
 /// Number of points or rays, RMS of their difference (mm) and its predicted covariance (mm^2).
 type Differing = (usize, f64, DMatrix<f64>);
 
+/// What the first half has; the second has the rest.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum FirstHalf {
+    /// These poses, by number.
+    Poses(BTreeSet<usize>),
+    /// Every other point of the target: where too few poses leave none to spare.
+    EveryOtherPoint,
+}
+
 /// The two halves of some poses.
 #[derive(Debug)]
 pub struct Halves {
@@ -161,14 +172,30 @@ pub fn splits(
     splits
 }
 
+/// The ways to divide what an estimate used: its poses ([`splits`]), or its points where a pose may stand alone.
+pub fn first_halves(
+    used: &Observations,
+    placement: impl Fn(usize) -> Option<usize>,
+) -> Vec<(Split, FirstHalf)> {
+    if Dealt::of(used) == Some(Dealt::Points) {
+        return vec![(Split::InTurn, FirstHalf::EveryOtherPoint)];
+    }
+    let splits = splits(used.poses.iter().copied(), placement).into_iter();
+    splits
+        .map(|(split, first)| (split, FirstHalf::Poses(first)))
+        .collect()
+}
+
 /// Estimates both halves, as `Estimate::of_poses` does.
 ///
 /// Cost: less than one estimate, the two in parallel.
 ///
 /// # Errors
 /// Why there are none.
-pub fn estimate_halves(estimate: &Estimate, first: &BTreeSet<usize>) -> Result<Halves, Skipped> {
-    if estimate.observations.different_pose_count() < MIN_POSES {
+pub fn estimate_halves(estimate: &Estimate, first: &FirstHalf) -> Result<Halves, Skipped> {
+    if matches!(first, FirstHalf::Poses(_))
+        && estimate.observations.different_pose_count() < MIN_POSES
+    {
         return Err(Skipped::TooFewPoses {
             have: estimate.observations.different_pose_count(),
             need: MIN_POSES,
@@ -176,7 +203,15 @@ pub fn estimate_halves(estimate: &Estimate, first: &BTreeSet<usize>) -> Result<H
     }
     let mut estimates: Vec<Estimate> = [true, false]
         .into_par_iter()
-        .map(|half| estimate.of_poses(|pose| first.contains(&pose) == half).ok())
+        .map(|half| {
+            let part = match first {
+                FirstHalf::Poses(first) => estimate.of_poses(|pose| first.contains(&pose) == half),
+                FirstHalf::EveryOtherPoint => {
+                    estimate.of_points(|row, col| (row + col).is_multiple_of(2) == half)
+                }
+            };
+            part.ok()
+        })
         .collect::<Option<_>>()
         .ok_or(Skipped::NoEstimate)?;
     let (Some(b), Some(a)) = (estimates.pop(), estimates.pop()) else {

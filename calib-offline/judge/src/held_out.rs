@@ -29,14 +29,14 @@ pub struct Estimated {
     pub board_shape: BoardShape,
 }
 
-/// An estimate from all poses but those of one fold.
+/// An estimate from all poses (or points) but those of one fold.
 #[derive(Debug, Clone)]
 pub struct Fold {
-    /// The rig that the other poses gave.
+    /// The rig that the others gave.
     pub rig: Rig,
     /// The board's shape that they gave.
     pub board_shape: BoardShape,
-    /// The poses left out.
+    /// What was left out.
     pub unseen: Observations,
 }
 
@@ -107,16 +107,70 @@ pub fn fold_of(pose_idx: usize, folds: usize) -> usize {
     pose_idx % folds.max(1)
 }
 
-/// So many folds, or none with too few poses to leave some out.
-pub fn folds_wanted(used: &Observations, folds: usize) -> usize {
-    if used.different_pose_count() >= 2 * MIN_POSES {
-        folds
-    } else {
-        0
+/// Points are no more folds than this: beyond, a fold may have too few to place the target.
+const MOST_FOLDS_OF_POINTS: usize = 10;
+
+/// What is dealt to the folds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dealt {
+    /// Poses.
+    Poses,
+    /// Points, by label: where too few poses leave none to spare and the target determines the cameras in one.
+    Points,
+}
+
+impl Dealt {
+    /// What the folds of a recording are dealt from; `None` with too few poses to leave some out.
+    pub fn of(used: &Observations) -> Option<Self> {
+        Self::of_count(used.different_pose_count(), used.may_be_one_pose())
+    }
+
+    /// The same of so many poses, of which one may determine everything or not.
+    pub fn of_count(poses: usize, may_be_one_pose: bool) -> Option<Self> {
+        if poses >= 2 * MIN_POSES {
+            return Some(Self::Poses);
+        }
+        may_be_one_pose.then_some(Self::Points)
+    }
+
+    /// In words.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Poses => "pose",
+            Self::Points => "point",
+        }
+    }
+
+    /// The part of a recording whose folds are wanted.
+    fn part(
+        self,
+        observations: &Observations,
+        folds: usize,
+        wanted: impl Fn(usize) -> bool,
+    ) -> Observations {
+        match self {
+            Self::Poses => observations.with_poses(|pose| {
+                let idx = observations.poses.binary_search(&pose);
+                wanted(idx.map_or(folds, |idx| fold_of(idx, folds)))
+            }),
+            // Odd, so that a fold is no column of a square grid of points.
+            Self::Points => {
+                observations.with_labels(|row, col| wanted(fold_of(7 * row + 3 * col, folds)))
+            }
+        }
     }
 }
 
-/// Estimates each fold from the other folds' poses by any method.
+/// So many folds, or none with nothing to leave out.
+pub fn folds_wanted(used: &Observations, folds: usize) -> usize {
+    match Dealt::of(used) {
+        Some(Dealt::Poses) => folds.min(used.poses.len()),
+        Some(Dealt::Points) => folds.min(MOST_FOLDS_OF_POINTS),
+        None => 0,
+    }
+}
+
+/// Estimates each fold from the other folds' poses (or points) by any method.
 ///
 /// Cost: `folds` estimates, run in parallel with ordered results.
 pub fn estimate_folds<E: Display>(
@@ -128,17 +182,14 @@ pub fn estimate_folds<E: Display>(
     let results: Vec<Result<Fold, FailedFold>> = (0..folds)
         .into_par_iter()
         .map(|fold| {
-            let in_fold = |pose: usize| {
-                let idx = observations.poses.binary_search(&pose);
-                idx.is_ok_and(|idx| fold_of(idx, folds) == fold)
-            };
-            let result = estimate(&observations.with_poses(|pose| !in_fold(pose)));
+            let dealt = Dealt::of(observations).unwrap_or(Dealt::Poses);
+            let result = estimate(&dealt.part(observations, folds, |of| of != fold));
             progress.advance();
             match result {
                 Ok(Estimated { rig, board_shape }) => Ok(Fold {
                     rig,
                     board_shape,
-                    unseen: observations.with_poses(in_fold),
+                    unseen: dealt.part(observations, folds, |of| of == fold),
                 }),
                 Err(error) => Err(FailedFold {
                     fold,

@@ -23,16 +23,19 @@ impl MeasuredBoard {
         self.corners
             .iter()
             .flat_map(|(row, col, point)| {
-                [(row + 1, *col), (*row, col + 1)]
-                    .into_iter()
-                    .filter_map(|neighbor| by_label.get(&neighbor))
-                    .map(|other| (point - other).norm() / board.square_mm - 1.0)
+                board
+                    .next_to(*row, *col)
+                    .filter_map(|next| Some((next, by_label.get(&next)?)))
+                    .map(|(next, other)| {
+                        let apart_mm = board.apart_mm((*row, *col), next);
+                        (point - other).norm() / board.square_mm - apart_mm / board.square_mm
+                    })
                     .collect::<Vec<_>>()
             })
             .collect()
     }
 
-    /// Distance of each corner from the best-placed flat board, mm; empty for fewer than 3 corners.
+    /// Distance of each corner from the best-placed nominal board, mm; empty for fewer than 3 corners.
     pub fn rigid_errors_mm(&self, board: &BoardSpec) -> Vec<f64> {
         let nominal: Vec<_> = self
             .corners
@@ -58,11 +61,7 @@ mod tests {
 
     #[test]
     fn a_scaled_board_shows_its_scale_and_a_moved_one_nothing() {
-        let board = BoardSpec {
-            rows: 4,
-            cols: 5,
-            square_mm: 10.0,
-        };
+        let board = BoardSpec::chessboard(4, 5, 10.0);
         let moved = RigidTransform::new(
             so3::exp(&Vector3::new(0.3, -1.0, 0.2)),
             Vector3::new(5.0, -7.0, 300.0),

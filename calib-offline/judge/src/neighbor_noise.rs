@@ -44,7 +44,7 @@ pub fn neighbor_noise_mm(rig: &Rig, observations: &Observations, sigma_px: f64) 
             let Some((point, by_pixels)) = measured.get(&(corner.row, corner.col)) else {
                 continue;
             };
-            for label in [(corner.row + 1, corner.col), (corner.row, corner.col + 1)] {
+            for label in observations.board.next_to(corner.row, corner.col) {
                 if let Some((other, by_others)) = measured.get(&label) {
                     let along = (point - other).normalize();
                     let squared = by_pixels.tr_mul(&along).norm_squared()

@@ -3,6 +3,7 @@
 use super::cause::Cause;
 use super::grade::Grade;
 use super::half_data::rays_apart;
+use super::held_out::Dealt;
 use super::suspect_words::{Told, advice, told};
 use super::working_volume::{compare, lattice, matches_at, span};
 use calib_estimate::explain::{Explanation, Since, explain};
@@ -17,6 +18,10 @@ pub(crate) const COSTLY: f64 = 2.0;
 ///
 /// Cost: one to three times that of the estimate.
 pub fn suspects(estimate: &Estimate, rig: &Rig) -> Vec<Cause> {
+    // Known places have no other reading, and few poses no before and after.
+    if Dealt::of(&estimate.observations) == Some(Dealt::Points) {
+        return Vec::new();
+    }
     let names: Vec<String> = rig.cameras.iter().map(|c| c.name.clone()).collect();
     let distances = span(&estimate.board_distances_mm(rig));
     let mut before = rig.clone();

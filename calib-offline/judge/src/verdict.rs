@@ -91,8 +91,8 @@ pub struct Figures {
     pub corners: (usize, usize),
     /// Views that could not be used as they were recorded, and all views.
     pub suspect_views: (usize, usize),
-    /// Poses used.
-    pub pose_count: usize,
+    /// Poses used; `None` where one is enough.
+    pub pose_count: Option<usize>,
     /// Whether the rays of every camera meet in a point.
     pub is_central: bool,
     /// Whether the adjustment came to rest.
@@ -130,13 +130,10 @@ pub fn judge(figures: &Figures, thresholds: &Thresholds) -> Verdict {
             ),
         ));
     }
-    if figures.pose_count < thresholds.poses {
+    if let Some(poses) = figures.pose_count.filter(|have| *have < thresholds.poses) {
         reasons.push((
             Grade::Fail,
-            format!(
-                "{} poses, {} or more needed",
-                figures.pose_count, thresholds.poses
-            ),
+            format!("{poses} poses, {} or more needed", thresholds.poses),
         ));
     }
     if !figures.settled {
@@ -343,7 +340,7 @@ mod tests {
             halves: vec![(Split::InTurn, half(1.3))],
             corners: (5000, 10),
             suspect_views: (1, 68),
-            pose_count: 34,
+            pose_count: Some(34),
             is_central: true,
             settled: true,
         }
@@ -403,7 +400,7 @@ mod tests {
             (|f| f.neighbors_mm = Some((0.0003, 0.0002)), Grade::Pass),
             (|f| f.corners = (500, 500), Grade::Fail),
             (|f| f.all_sigma_px = 0.5, Grade::Doubtful),
-            (|f| f.pose_count = 2, Grade::Fail),
+            (|f| f.pose_count = Some(2), Grade::Fail),
         ];
         for (spoil, expected) in cases {
             let mut figures = good();

@@ -23,7 +23,11 @@ fn calibrated(seed: u64, focal: f64) -> (Estimate, Calibrated, Vec<f64>) {
         .iter()
         .map(calib_simulate::CameraOptics::sensor)
         .collect();
-    let observations = Observations::new(session.scene.settings.board, sensors, &session.views());
+    let observations = Observations::new(
+        session.scene.settings.board.clone(),
+        sensors,
+        &session.views(),
+    );
     let start = start_rig(&observations).unwrap();
     let (estimate, _) = estimate_screened(&observations, start).unwrap();
     let rig = estimate.rig(&["left".to_owned(), "right".to_owned()]);

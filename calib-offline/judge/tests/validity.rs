@@ -24,7 +24,7 @@ fn observed(session: &Session, poses: usize) -> Observations {
         .iter()
         .map(calib_simulate::CameraOptics::sensor)
         .collect();
-    Observations::new(session.scene.settings.board, sensors, &views)
+    Observations::new(session.scene.settings.board.clone(), sensors, &views)
 }
 
 /// A recording's estimate, its rig, and three more boards seen by a rig that `change` has changed.

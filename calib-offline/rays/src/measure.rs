@@ -69,7 +69,7 @@ pub trait PointSource: Sync {
     /// The names of the rig's cameras, in order.
     fn cameras(&self) -> Vec<String>;
 
-    /// The point seen by two or more cameras.
+    /// The point seen by two or more cameras. Of more than two, those count whose pixels are calibrated.
     ///
     /// # Errors
     /// [`Status`] where there is none.
@@ -146,6 +146,17 @@ impl PointSource for RigSource<'_> {
     }
 
     fn point(&self, sightings: &[Sighting<f64>]) -> Result<Point<f64>, Status> {
+        let answering;
+        let sightings = if sightings.len() > 2 {
+            answering = answering_of(sightings, |sighting| {
+                let (camera_idx, pixel) = pixel(*sighting);
+                let camera = self.rig.cameras.get(camera_idx);
+                camera.is_some_and(|camera| camera.coverage.contains(pixel))
+            });
+            &answering[..]
+        } else {
+            sightings
+        };
         let result = if let [a, b] = *sightings {
             self.rig.triangulate(&[pixel(a), pixel(b)])
         } else {
@@ -178,6 +189,19 @@ impl PointSource for RigSource<'_> {
             Some(frame) => frame.rotation * in_rig * frame.rotation.transpose(),
         })
     }
+}
+
+/// Of a point that more than two cameras saw, the sightings whose pixels are calibrated, if two are: a camera that
+/// has no ray is one that did not see the point. Else all of them, to be refused.
+pub fn answering_of<N: Copy>(
+    sightings: &[Sighting<N>],
+    is_calibrated: impl Fn(&Sighting<N>) -> bool,
+) -> Vec<Sighting<N>> {
+    let calibrated: Vec<_> = sightings.iter().copied().filter(is_calibrated).collect();
+    if calibrated.len() < 2 {
+        return sightings.to_vec();
+    }
+    calibrated
 }
 
 fn pixel((camera_idx, [u, v]): Sighting<f64>) -> (usize, PixelPoint) {

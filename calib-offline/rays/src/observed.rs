@@ -1,6 +1,8 @@
 //! What was seen of a board: labelled corners, view by view.
 
-use crate::geometry::PixelPoint;
+use crate::geometry::{PixelPoint, RigidTransform};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
 /// Fewest poses of the board that determine a camera: with two, the focal length of a general
@@ -35,4 +37,15 @@ pub struct View {
 /// The distinct pose numbers among the views.
 pub fn poses(views: &[View]) -> BTreeSet<usize> {
     views.iter().map(|view| view.pose).collect()
+}
+
+/// Where a target stood, known by other means than the cameras.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct KnownPose {
+    /// In the rig's frame, which is that of all known poses.
+    pub rig_from_board: RigidTransform,
+    /// Standard deviation of each coordinate of the place of the target's origin, mm; 0 for an exact one.
+    pub sigma_mm: f64,
+    /// Standard deviation of the turn about each axis, rad; 0 for an exact one.
+    pub sigma_rad: f64,
 }

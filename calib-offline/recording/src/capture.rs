@@ -87,7 +87,10 @@ impl Capture {
         let mut warnings = Vec::new();
         if let Err(error) = check_sufficiency(dataset, views) {
             warnings.push(format!("this cannot be calibrated: {error}"));
-        } else if self.poses < FEW_POSES {
+        } else if self.poses < FEW_POSES
+            && dataset.board.layout.is_grid()
+            && dataset.known_poses.is_empty()
+        {
             warnings.push(format!(
                 "{} poses are few: add tilts and distances, ten or more",
                 self.poses
@@ -200,17 +203,14 @@ fn board_warning(dataset: &Dataset, views: &[View]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::CameraSpec;
+    use crate::dataset::{BoardKind, CameraSpec};
     use calib_rays::board::BoardSpec;
 
     fn dataset(sensor: SensorSize) -> Dataset {
         Dataset {
             folder: ".".into(),
-            board: BoardSpec {
-                rows: 4,
-                cols: 5,
-                square_mm: 10.0,
-            },
+            kind: BoardKind::Chessboard,
+            board: BoardSpec::chessboard(4, 5, 10.0),
             cameras: vec![CameraSpec {
                 name: "left".to_owned(),
                 sensor,
@@ -219,6 +219,7 @@ mod tests {
                 serial: None,
             }],
             stage: None,
+            known_poses: [].into(),
             excluded_poses: [].into(),
             target: None,
             certificate: None,

@@ -25,6 +25,7 @@ impl Displaced {
             rows,
             cols,
             square_mm,
+            ..
         } = self.board;
         let place = |x_mm: f64, count: usize| {
             let x = (x_mm / square_mm).clamp(0.0, (count - 1) as f64);

@@ -24,6 +24,7 @@ pub mod scene;
 pub mod settings;
 pub mod stage;
 mod tables;
+pub mod tank;
 pub mod target;
 mod writer;
 

@@ -7,7 +7,7 @@
 use calib_rays::board::BoardSpec;
 
 /// A printed plate.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Pattern {
     /// The calibration board: squares one ring beyond the inner corners, white margin around.
     Chessboard(BoardSpec),

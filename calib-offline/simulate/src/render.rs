@@ -124,7 +124,7 @@ impl PlateView<'_> {
             (lambda > 0.0).then(|| (ray.origin_mm + ray.direction * lambda).xy())
         };
         let mut point = at_height(0.0)?;
-        if let (Pattern::Chessboard(board), true) = (self.pattern, self.bow_mm != 0.0) {
+        if let (Pattern::Chessboard(board), true) = (&self.pattern, self.bow_mm != 0.0) {
             let (width_mm, height_mm) = board.extent_mm();
             // The bow is shallow: each round gains at least two digits.
             for _ in 0..8 {

@@ -29,7 +29,7 @@ fn board_view(scene: &Scene, camera_idx: usize, pose: usize) -> PlateView<'_> {
     PlateView {
         camera: &scene.cameras[camera_idx],
         camera_from_plate: scene.left_from_camera[camera_idx].inverse() * scene.true_poses[pose],
-        pattern: Pattern::Chessboard(scene.settings.board),
+        pattern: Pattern::Chessboard(scene.settings.board.clone()),
         bow_mm: scene.settings.bow_mm,
         displaced: None,
     }

@@ -183,7 +183,7 @@ impl Scene {
         let mut view = PlateView {
             camera: &self.cameras[camera_idx],
             camera_from_plate: camera_from_left * self.exposed_pose(camera_idx, pose),
-            pattern: Pattern::Chessboard(self.settings.board),
+            pattern: Pattern::Chessboard(self.settings.board.clone()),
             bow_mm: self.settings.bow_mm,
             displaced: None,
         };
@@ -199,7 +199,7 @@ impl Scene {
 
     /// What moves the image of every corner by its noise; a corner that is not seen stays where it is.
     fn displaced(&self, camera_idx: usize, pose: usize, view: &PlateView<'_>) -> Displaced {
-        let board = self.settings.board;
+        let board = &self.settings.board;
         let left_from_board = self.exposed_pose(camera_idx, pose);
         let displacement_mm = |k: usize, [du, dv]: [f64; 2]| {
             let corner = self.corner_in_board(k / board.cols, k % board.cols);
@@ -210,7 +210,7 @@ impl Scene {
         let noise_px = self.noise_px(camera_idx, pose).into_iter().enumerate();
         let corners_mm =
             noise_px.map(|(k, noise_px)| displacement_mm(k, noise_px).unwrap_or_default());
-        Displaced::new(board, corners_mm.collect())
+        Displaced::new(board.clone(), corners_mm.collect())
     }
 
     /// The ring target as a camera takes it, with the sensor noise of a stream.

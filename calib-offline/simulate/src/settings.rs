@@ -67,11 +67,7 @@ impl SceneSettings {
         Self {
             optics,
             sensor: SensorSize::new(1280, 1024),
-            board: BoardSpec {
-                rows: 15,
-                cols: 13,
-                square_mm: 10.0,
-            },
+            board: BoardSpec::chessboard(15, 13, 10.0),
             placements,
             spread: 1.0,
             angles_deg: (-half_count..=half_count)

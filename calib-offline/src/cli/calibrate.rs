@@ -66,8 +66,16 @@ With --json, schema calib-offline/calibrate/1; a figure that does not apply is n
                                  cannot say it better; curve: other sizes of all tables
   calibration, rig, report       the three files";
 
-/// The blob's bound unless `pack` is asked for another, px: well below the noise of any corner.
-pub const BLOB_MAX_ERROR_PX: f64 = 0.001;
+/// The blob's bound unless `pack` is asked for another: this share of the corners' standard deviation adds a
+/// ten-thousandth to the variance of a pixel ...
+const BLOB_NOISE_SHARE: f64 = 0.01;
+/// ... and at least so much, px: well below the noise of any corner.
+const BLOB_LEAST_BOUND_PX: f64 = 0.001;
+
+/// The blob's bound unless `pack` is asked for another, px.
+pub fn blob_max_error_px(calibration: &Calibration) -> f64 {
+    (BLOB_NOISE_SHARE * calibration.estimate.sigma_px).max(BLOB_LEAST_BOUND_PX)
+}
 
 /// Names of the files written, in the output folder.
 pub const FILES: [&str; 3] = ["calibration.json", "rig.rays", "report.html"];
@@ -265,13 +273,11 @@ pub fn write_results(
         ray_tables,
     } = calibrated;
     console.progress().begin("packing the blob", 0);
-    let packed = pack_nearest(
-        &calibration.rig,
-        &pack_settings(&calibration, BLOB_MAX_ERROR_PX),
-    );
+    let max_error_px = blob_max_error_px(&calibration);
+    let packed = pack_nearest(&calibration.rig, &pack_settings(&calibration, max_error_px));
     console.progress().end();
     let packed = packed?;
-    let blob = BlobFacts::new(&packed, BLOB_MAX_ERROR_PX);
+    let blob = BlobFacts::new(&packed, max_error_px);
     if let Some(warning) = blob.warning() {
         console.warn(&warning);
     }

@@ -1,7 +1,9 @@
 //! `demo`: the whole chain on the data that comes with the program.
 
 use super::Outcome;
-use super::calibrate::{FILES, Written, pack_settings, say_what_is_used, write_results};
+use super::calibrate::{
+    FILES, Written, blob_max_error_px, pack_settings, say_what_is_used, write_results,
+};
 use super::error::Error;
 use super::output::Console;
 use super::usage_error::UsageError;
@@ -180,7 +182,7 @@ fn measure(
     offered: &Observations,
 ) -> Result<Measured, Error> {
     let calibration = &written.calibration;
-    let settings = pack_settings(calibration, super::calibrate::BLOB_MAX_ERROR_PX);
+    let settings = pack_settings(calibration, blob_max_error_px(calibration));
     let unseen_boards = measure_unseen(folds, offered, &settings)?;
     let [_, rays, _] = &written.files;
     let bytes = read(rays)?;

@@ -251,7 +251,7 @@ mod tests {
     use calib_rays::board::BoardSpec;
     use calib_rays::geometry::SensorSize;
     use calib_rays::progress::Silent;
-    use calib_recording::dataset::CameraSpec;
+    use calib_recording::dataset::{BoardKind, CameraSpec};
 
     #[test]
     fn a_refused_image_is_named_in_words_and_in_json_and_framed_in_its_overlay() {
@@ -262,11 +262,8 @@ mod tests {
             .unwrap();
         let dataset = Dataset {
             folder: folder.path().to_path_buf(),
-            board: BoardSpec {
-                rows: 6,
-                cols: 9,
-                square_mm: 25.0,
-            },
+            kind: BoardKind::Chessboard,
+            board: BoardSpec::chessboard(6, 9, 25.0),
             cameras: vec![CameraSpec {
                 name: "left".to_string(),
                 sensor: SensorSize::new(64, 48),
@@ -275,6 +272,7 @@ mod tests {
                 serial: None,
             }],
             stage: None,
+            known_poses: [].into(),
             excluded_poses: std::collections::BTreeSet::new(),
             target: None,
             certificate: None,

@@ -78,7 +78,9 @@ fn of_calibration(error: &CalibrateError) -> Option<Code> {
         CalibrateError::Sufficiency(source) | CalibrateError::FewImages { source, .. } => {
             match source {
                 SufficiencyError::SameView { .. } => Some(Code::Duplicates),
-                SufficiencyError::TooFewPoses { .. } => Some(Code::FewPoses),
+                SufficiencyError::TooFewPoses { .. } | SufficiencyError::Flat { .. } => {
+                    Some(Code::FewPoses)
+                }
                 _ => None,
             }
         }

@@ -83,6 +83,8 @@ struct DatasetObject {
     rows: usize,
     cols: usize,
     square_mm: f64,
+    #[serde(skip)]
+    board: String,
     stage: bool,
     excluded: Vec<usize>,
     source: &'static str,
@@ -217,6 +219,7 @@ fn dataset_object(path: &Path) -> Result<DatasetObject, Error> {
         rows: dataset.board.rows,
         cols: dataset.board.cols,
         square_mm: dataset.board.square_mm,
+        board: dataset.board.words(),
         stage: dataset.stage.is_some(),
         excluded: dataset.excluded_poses.iter().copied().collect(),
         source,
@@ -238,11 +241,9 @@ fn dataset_object(path: &Path) -> Result<DatasetObject, Error> {
 
 fn dataset_words(object: &DatasetObject) -> String {
     let mut words = format!(
-        "dataset         {}\nboard           {} rows x {} cols of inner corners, {} mm{}\n",
+        "dataset         {}\nboard           {}{}\n",
         object.folder.display(),
-        object.rows,
-        object.cols,
-        object.square_mm,
+        object.board,
         if object.stage { ", on a stage" } else { "" }
     );
     // Writing to a String cannot fail.

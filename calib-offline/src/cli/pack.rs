@@ -1,7 +1,7 @@
 //! `pack`: a calibration to a blob within a proven error.
 
 use super::Outcome;
-use super::calibrate::{BLOB_MAX_ERROR_PX, pack_settings};
+use super::calibrate::{blob_max_error_px, pack_settings};
 use super::error::Error;
 use super::match_noise::parse;
 use super::output::Console;
@@ -129,7 +129,7 @@ pub fn run(args: &PackArgs, console: &Console) -> Result<Outcome, Error> {
     console.progress().begin("packing the blob", 0);
     let default_px = match args.max_bytes {
         Some(_) => LOOSEST_PX,
-        None => BLOB_MAX_ERROR_PX,
+        None => blob_max_error_px(&calibration),
     };
     let max_error_px = args.max_error_px.unwrap_or(default_px);
     let settings = PackSettings {

@@ -71,7 +71,7 @@ pub fn compare_methods(
     progress.end();
     let given = screened.given(&names, &placements);
     let observations = given.observations;
-    let folds = folds_wanted(observations, folds).min(observations.poses.len());
+    let folds = folds_wanted(observations, folds);
     let runs: Vec<Run> = methods
         .iter()
         .map(|method| {

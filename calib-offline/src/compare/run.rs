@@ -31,7 +31,7 @@ impl<'a> Run<'a> {
         Self {
             method,
             answer: solution.map(|solution| Answer::new(solution, given.observations)),
-            folds: fit_folds(method, given, given.observations, folds, progress),
+            folds: fit_folds(method, given, given.observations, folds, None, progress),
             time: began.elapsed(),
         }
     }

@@ -35,6 +35,7 @@ impl Method for Alternating {
 
     /// Screens and estimates. Corners count where the joint estimate's weights would keep them.
     fn fit(&self, given: &Given, progress: &dyn Progress) -> Result<Solution, MethodError> {
+        MethodError::check_board(self.title(), &given.observations.board)?;
         progress.begin("initialize", 1);
         let start = start_rig(given.observations)?;
         progress.end();

@@ -4,6 +4,7 @@ use calib_estimate::alternating::AlternatingError;
 use calib_estimate::init::InitError;
 use calib_estimate::joint::EstimateError;
 use calib_estimate::pinhole::PinholeError;
+use calib_rays::board::BoardSpec;
 use calib_rays::remedy::Remedy;
 use std::error::Error;
 use std::sync::Arc;
@@ -24,12 +25,34 @@ pub enum MethodError {
     /// No baseline.
     #[error("the pinhole baseline failed")]
     Pinhole(#[from] PinholeError),
+    /// A method for flat boards that stand at z = 0 of their own frame, and another target.
+    #[error("{method} needs a flat grid whose poses are free; the target is {target}")]
+    NeedsBoard {
+        /// The method.
+        method: &'static str,
+        /// What the target is.
+        target: String,
+    },
     /// No answer of a method that is not one of this program's.
     #[error("the method failed")]
     Other(#[source] Arc<dyn Error + Send + Sync>),
 }
 
 impl MethodError {
+    /// Refuses a target that is no flat grid.
+    ///
+    /// # Errors
+    /// [`Self::NeedsBoard`].
+    pub fn check_board(method: &'static str, board: &BoardSpec) -> Result<(), Self> {
+        if board.layout.is_grid() {
+            return Ok(());
+        }
+        Err(Self::NeedsBoard {
+            method,
+            target: board.words(),
+        })
+    }
+
     /// The innermost cause, in words: what a table has room for.
     pub fn reason(&self) -> String {
         let mut cause: &dyn Error = self;
@@ -54,6 +77,9 @@ impl Remedy for MethodError {
             Self::Alternating(_) => {
                 "leave --method out: the joint estimate takes all views together; or add boards at \
                  other distances"
+            }
+            Self::NeedsBoard { .. } => {
+                "leave --method out: the joint estimate takes points with known places"
             }
             Self::Other(_) => return None,
         };

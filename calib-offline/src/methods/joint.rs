@@ -6,7 +6,7 @@ use crate::report::record::ChoicesRecord;
 use calib_estimate::adjust::Observations;
 use calib_estimate::init::rig::start_rig;
 use calib_estimate::joint::{Estimate, EstimateError, estimate, estimate_screened};
-use calib_judge::half_data::Split;
+use calib_judge::half_data::{FirstHalf, Split};
 use calib_judge::held_out::Estimated;
 use calib_judge::suspects::{left_open_mm, suspects};
 use calib_judge::working_volume::span;
@@ -15,7 +15,6 @@ use calib_judge::{
 };
 use calib_rays::field::Rig;
 use calib_rays::progress::Progress;
-use std::collections::BTreeSet;
 
 /// Ray fields, poses and board shape of all views together.
 #[derive(Debug, Clone, Copy)]
@@ -78,8 +77,18 @@ impl Method for Joint {
 }
 
 impl Own for Estimate {
-    fn check(&self, rig: &Rig, splits: &[(Split, BTreeSet<usize>)]) -> Option<CrossChecks> {
+    fn check(&self, rig: &Rig, splits: &[(Split, FirstHalf)]) -> Option<CrossChecks> {
         Some(cross_check(self, rig, splits))
+    }
+
+    fn again(&self, training: &Observations) -> Option<Result<Estimated, MethodError>> {
+        let again = self
+            .of_part_of_points(training.clone())
+            .map(|estimate| Estimated {
+                rig: estimate.rig(&training.numbered_cameras()),
+                board_shape: estimate.model.board_shape,
+            });
+        Some(again.map_err(MethodError::from))
     }
 
     fn freedom(&self) -> f64 {

@@ -1,10 +1,10 @@
 //! What a method is: what it is given, and what it is asked for.
 
-use super::{MethodError, Solution};
+use super::{MethodError, Own, Solution};
 use calib_estimate::adjust::Observations;
 use calib_estimate::init::screening::Finding;
 use calib_estimate::joint::Estimate;
-use calib_judge::held_out::Estimated;
+use calib_judge::held_out::{Dealt, Estimated};
 use calib_judge::{Folds, estimate_folds};
 use calib_rays::progress::Progress;
 use std::collections::BTreeMap;
@@ -52,16 +52,20 @@ pub trait Method: Debug + Sync {
     ) -> Result<Estimated, MethodError>;
 }
 
-/// A method's answers without the poses of each fold, for the check on boards that it never saw.
+/// A method's answers without the poses (or points) of each fold, for the check on boards that it never saw. Without
+/// some points it goes on from its answer to all of them, `own`, if it can and there is one.
 pub fn fit_folds(
     method: &dyn Method,
     given: &Given,
     observations: &Observations,
     folds: usize,
+    own: Option<&dyn Own>,
     progress: &dyn Progress,
 ) -> Folds {
+    let own = own.filter(|_| Dealt::of(observations) == Some(Dealt::Points));
     let fit = |training: &Observations| {
-        let found = method.fit_some_poses(training, given);
+        let again = own.and_then(|own| own.again(training));
+        let found = again.unwrap_or_else(|| method.fit_some_poses(training, given));
         found.map_err(|error| error.reason())
     };
     estimate_folds(observations, folds, &fit, progress)

@@ -26,6 +26,7 @@ impl Method for Pinhole {
     }
 
     fn fit(&self, given: &Given, progress: &dyn Progress) -> Result<Solution, MethodError> {
+        MethodError::check_board(self.title(), &given.observations.board)?;
         progress.begin("estimate", 1);
         let offered = given.observations;
         let pinhole = calibrate_rig(offered, &settings())?;

@@ -1,10 +1,12 @@
 //! What a method found, whichever it was: all that the record, the report and a comparison need.
 
+use super::MethodError;
 use crate::report::record::{AlternatingRecord, ChoicesRecord};
 use calib_estimate::adjust::robust::{StudentT, relative_weights, reweight};
 use calib_estimate::adjust::{Observations, StopReason};
 use calib_estimate::init::screening::Finding;
-use calib_judge::half_data::Split;
+use calib_judge::half_data::{FirstHalf, Split};
+use calib_judge::held_out::Estimated;
 use calib_judge::known_points::{Points, measure};
 use calib_judge::{Cause, CrossChecks, Declared, ExpectedError, Task, TaskError};
 use calib_rays::board::BoardShape;
@@ -13,7 +15,6 @@ use calib_rays::geometry::{RigidTransform, SensorSize};
 use calib_rays::measure::{PointSource, RigSource, Sighting};
 use calib_rays::numerics::median;
 use nalgebra::Vector2;
-use std::collections::BTreeSet;
 use std::fmt::Debug;
 
 /// A calibration as a method gives it.
@@ -70,7 +71,13 @@ pub trait Own: Debug + Send + Sync {
 
     /// Checks of the calibration against itself; `rig` is that of the solution, `splits` are the ways to
     /// halve its poses, none if halves are not to be compared.
-    fn check(&self, _rig: &Rig, _splits: &[(Split, BTreeSet<usize>)]) -> Option<CrossChecks> {
+    fn check(&self, _rig: &Rig, _splits: &[(Split, FirstHalf)]) -> Option<CrossChecks> {
+        None
+    }
+
+    /// Its answer from a part of the points of all its poses, made again from where it ended; `None` if it can only
+    /// begin anew.
+    fn again(&self, _training: &Observations) -> Option<Result<Estimated, MethodError>> {
         None
     }
 

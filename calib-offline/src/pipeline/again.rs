@@ -21,7 +21,8 @@ pub fn estimate_again(calibration: &Calibration) -> Option<Result<Estimate, Meth
     let cameras = calibration.rig.cameras.iter();
     let sensors = cameras.map(|camera| camera.field.sensor).collect();
     let views = views(calibration);
-    let observations = Observations::new(calibration.board, sensors, &views);
+    let observations = Observations::new(calibration.board.clone(), sensors, &views)
+        .with_known_poses(calibration.known_poses.clone());
     let found = start_rig(&observations)
         .map_err(MethodError::from)
         .and_then(|start| Ok(estimate_screened(&observations, start)?.0));

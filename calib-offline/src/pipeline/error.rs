@@ -19,6 +19,9 @@ pub enum CalibrateError {
     /// A pose to leave out that there is not.
     #[error(transparent)]
     Exclude(#[from] NoSuchPose),
+    /// Known poses of another recording.
+    #[error(transparent)]
+    Known(#[from] NoKnownPose),
     /// Corners that no method could work with.
     #[error("these corners cannot determine a calibration")]
     Sufficiency(#[from] SufficiencyError),
@@ -62,11 +65,19 @@ pub struct NoSuchPose {
     pub last: usize,
 }
 
+/// Poses that are known beforehand, and none of them seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("no pose that [poses] known lists has corners; the first listed is pose {first}")]
+pub struct NoKnownPose {
+    /// The first pose listed.
+    pub first: usize,
+}
+
 impl CalibrateError {
     /// Whether the input can be used, and the data cannot determine the answer.
     pub fn is_undetermined(&self) -> bool {
         match self {
-            Self::Corners(_) | Self::Exclude(_) => false,
+            Self::Corners(_) | Self::Exclude(_) | Self::Known(_) => false,
             Self::Detect(error) => matches!(error, DetectError::Consistency(_)),
             Self::Task(error) => error.is_undetermined(),
             Self::Sufficiency(_)
@@ -83,6 +94,9 @@ impl Remedy for CalibrateError {
             Self::Corners(error) => error.remedy(),
             Self::Detect(error) => error.remedy(),
             Self::Exclude(error) => error.remedy(),
+            Self::Known(_) => Some(
+                "number the poses as corners.csv or the images do, from 0, or leave [poses] known out".to_owned(),
+            ),
             Self::Sufficiency(error) => error.remedy(),
             Self::FewImages { .. } => Some(
                 "correct dataset.toml or the images as the reason says; calib-offline detect DATASET \

@@ -1,7 +1,7 @@
 //! What a dataset offers to any method, and why none could make use of it.
 
 use super::corners::Corners;
-use super::error::{CalibrateError, NoSuchPose};
+use super::error::{CalibrateError, NoKnownPose, NoSuchPose};
 use crate::methods::MethodError;
 use calib_estimate::adjust::Observations;
 use calib_judge::plausibility::Sheet;
@@ -31,10 +31,12 @@ pub fn offered(dataset: &Dataset, corners: &Corners) -> Result<Offered, Calibrat
     let views = without_excluded(corners.views.clone(), &dataset.excluded_poses).used;
     check_sufficiency(dataset, &views)
         .map_err(|error| with_refusals(dataset, error, corners.detection.as_ref()))?;
+    check_known(dataset, &views)?;
     let sensors = dataset.cameras.iter().map(|camera| camera.sensor).collect();
     Ok(Offered {
-        observations: Observations::new(dataset.board, sensors, &views)
-            .with_flatness(dataset.certificate.and_then(|c| c.flatness_mm_sd)),
+        observations: Observations::new(dataset.board.clone(), sensors, &views)
+            .with_flatness(dataset.certificate.and_then(|c| c.flatness_mm_sd))
+            .with_known_poses(dataset.known_poses.clone()),
         views,
     })
 }
@@ -66,6 +68,18 @@ fn check_excluded(dataset: &Dataset, views: &[View]) -> Result<(), NoSuchPose> {
         Some(&pose) => Err(NoSuchPose { pose, last }),
         None => Ok(()),
     }
+}
+
+/// Poses that are known must be among those that were seen: a file for another recording would be passed over.
+fn check_known(dataset: &Dataset, views: &[View]) -> Result<(), NoKnownPose> {
+    let known = &dataset.known_poses;
+    let Some((&first, _)) = known.first_key_value() else {
+        return Ok(());
+    };
+    if views.iter().any(|view| known.contains_key(&view.pose)) {
+        return Ok(());
+    }
+    Err(NoKnownPose { first })
 }
 
 /// Too few corners, with the reason for which images were refused.

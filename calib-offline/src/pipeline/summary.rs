@@ -37,7 +37,8 @@ pub fn record(parts: &Parts) -> Calibration {
         command: None,
         method: solution.method.to_string(),
         input_sha256: input_sha256(parts.dataset, &parts.corners.views),
-        board: parts.dataset.board,
+        board: parts.dataset.board.clone(),
+        known_poses: parts.observations.known_poses.clone(),
         certificate: parts.dataset.certificate,
         recording: parts.dataset.recording.clone(),
         cameras: parts.dataset.cameras.iter().map(camera_record).collect(),
@@ -91,7 +92,7 @@ fn figures(parts: &Parts, summary: &EstimateRecord) -> Figures {
         halves: halves.map(|(split, half)| (split, *half)).collect(),
         corners: (summary.corners_used, summary.corners_rejected),
         suspect_views: (solution.findings.len(), parts.observations.views.len()),
-        pose_count: solution.pose_count(),
+        pose_count: (!solution.observations.may_be_one_pose()).then(|| solution.pose_count()),
         is_central: rig.cameras.iter().all(|camera| camera.field.is_central()),
         settled: solution.settled,
     }

@@ -51,7 +51,7 @@ pub fn verify(
             ..view
         })
         .collect();
-    let new = Observations::new(calibration.board, sensors, &views);
+    let new = Observations::new(calibration.board.clone(), sensors, &views);
     progress.begin("old estimate", 0);
     let found = estimate_again(calibration);
     progress.end();
@@ -97,8 +97,8 @@ fn cameras(calibration: &Calibration, dataset: &Dataset) -> Result<Vec<usize>, V
     }
     if dataset.board != calibration.board {
         return Err(VerifyError::OtherBoard {
-            old: calibration.board,
-            new: dataset.board,
+            old: calibration.board.clone(),
+            new: dataset.board.clone(),
         });
     }
     Ok(found)

@@ -1,7 +1,7 @@
 //! Why a calibration cannot be held against a dataset.
 
 use crate::methods::MethodError;
-use calib_rays::board::BoardSpec;
+use calib_rays::board::{BoardSpec, Layout};
 use calib_rays::remedy::Remedy;
 
 /// Why a calibration cannot be held against a dataset.
@@ -59,12 +59,11 @@ pub enum VerifyError {
 }
 
 fn words(board: &BoardSpec) -> String {
-    let BoardSpec {
-        rows,
-        cols,
-        square_mm,
-    } = board;
-    format!("{rows} x {cols} corners and {square_mm} mm squares")
+    let (rows, cols, square_mm) = (board.rows, board.cols, board.square_mm);
+    match board.layout {
+        Layout::Points(_) => format!("{cols} points"),
+        Layout::Grid => format!("{rows} x {cols} corners and {square_mm} mm squares"),
+    }
 }
 
 impl VerifyError {

@@ -63,7 +63,9 @@ fn chosen(calibration: &Calibration, choices: &ChoicesRecord) -> Markup {
             h2 { "Chosen by the data" }
             p.read { strong { "How to read this. " } "Evidence is twice the logarithm of how probable a model makes the data: a more flexible model is taken if it gains more than " (NEEDED_GAIN) ", and kept as long as a simpler one loses more than that. Of the numbers that a model has, the data use as many as they determine; the others are held by smoothness." }
             dl {
-                dt { "Board's shape" } dd { (words::board(choices)) }
+                @if calibration.board.layout.is_grid() {
+                    dt { "Board's shape" } dd { (words::board(choices)) }
+                }
                 dt { "Noise" } dd { (words::noise(choices)) }
             }
             div.figures {

@@ -27,11 +27,7 @@ const POSE_COUNT: usize = 34;
 
 /// Two cameras, 200 mm apart, before a 15 x 13 board on a stage.
 pub fn calibration() -> Calibration {
-    let board = BoardSpec {
-        rows: 15,
-        cols: 13,
-        square_mm: 10.0,
-    };
+    let board = BoardSpec::chessboard(15, 13, 10.0);
     let rig_from_cameras = [("left", -1.0), ("right", 1.0)].map(|(name, side)| {
         let turned = so3::exp(&Vector3::new(0.0, -side * 0.24, 0.0));
         (
@@ -87,6 +83,7 @@ pub fn calibration() -> Calibration {
         method: "joint".to_owned(),
         input_sha256: "9f2c4e".repeat(11)[..64].to_owned(),
         board,
+        known_poses: [].into(),
         cameras: declared_cameras(),
         board_shape: BoardShape {
             terms: vec![(2, 0, 0.03), (0, 2, -0.02)],
@@ -95,6 +92,7 @@ pub fn calibration() -> Calibration {
             uncertainty: vec![uncertainty()],
             cameras,
             datum_pose: 8,
+            frame_is_known: false,
             match_noise_px: None,
         },
         estimate: estimate(&corners),

@@ -97,7 +97,7 @@ fn headline(calibration: &Calibration, facts: &Facts, blob: Option<&BlobFacts>) 
                 (card("Held-out residual", &px(value), "RMS residual vector, board pose refitted"))
             }
             @if let Some(held_out) = held_out {
-                (card("Held-out check", &format!("{} folds", held_out.folds), &format!("by pose; {} points, {} outside the calibrated area{}", held_out.point_count, held_out.outside_count, failed_folds(held_out))))
+                (card("Held-out check", &format!("{} folds", held_out.folds), &format!("by {}; {} points, {} outside the calibrated area{}", calibration.dealt_word(), held_out.point_count, held_out.outside_count, failed_folds(held_out))))
             } @else {
                 (card("Held-out check", "none", "too few poses to leave some out"))
             }
@@ -194,9 +194,9 @@ fn provenance(calibration: &Calibration) -> Markup {
         footer {
             dl {
                 dt { "Program" } dd { "calib-offline " (calibration.tool_version) ", method " (calibration.method) }
-                dt { "Board" } dd { (board.rows) " rows x " (board.cols) " cols of inner corners, " (board.square_mm) " mm" }
+                dt { "Board" } dd { (board.words()) }
                 dt { "Input" } dd { "SHA-256 " code { (calibration.input_sha256) } }
-                dt { "Conventions" } dd { "Millimeters. The center of the top-left pixel is (0, 0), u right, v down. The rig frame is the board at pose " (calibration.rig.datum_pose) "." }
+                dt { "Conventions" } dd { "Millimeters. The center of the top-left pixel is (0, 0), u right, v down. The rig frame is the " (calibration.rig.frame()) "." }
                 dt { "Numbers" } dd { "Everything drawn here stands in calibration.json." }
             }
         }

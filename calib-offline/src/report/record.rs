@@ -12,10 +12,12 @@ pub use calib_rays::board::BoardShape;
 use calib_rays::board::BoardSpec;
 use calib_rays::field::Rig;
 use calib_rays::geometry::{PixelPoint, RigidTransform};
+use calib_rays::observed::KnownPose;
 pub use calib_recording::dataset::{Certificate, ExpectedOptics, RecordingSpec};
 use nalgebra::Vector2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Name and version of the format: the one written.
 pub const SCHEMA: &str = "calib-offline/calibration/2";
@@ -47,6 +49,9 @@ pub struct Calibration {
     /// What the manifest says of the board's lengths, if it does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub certificate: Option<Certificate>,
+    /// Poses that were known beforehand, by number.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub known_poses: BTreeMap<usize, KnownPose>,
     /// What the manifest says of the recording, if it does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording: Option<RecordingSpec>,

@@ -3,12 +3,14 @@
 
 use super::Calibration;
 use super::record::{SCHEMA, SCHEMA_1};
+use calib_judge::held_out::Dealt;
 use calib_rays::field::polynomial::{MAX_DEGREE, term_count};
 use calib_rays::field::{CalibratedCamera, PairUncertainty, SmoothMap};
 use calib_rays::remedy::Remedy;
 use ray_runtime::MatchNoise;
 use ray_runtime::format::IDENTITY_LEN;
 use sha2::{Digest, Sha256};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Why a file is not a calibration that this version reads.
@@ -75,6 +77,13 @@ impl Remedy for CalibrationError {
 }
 
 impl Calibration {
+    /// What its held-out check was dealt from, in words.
+    pub fn dealt_word(&self) -> &'static str {
+        let poses: BTreeSet<usize> = self.poses.iter().map(|pose| pose.pose).collect();
+        let may_be_one_pose = !self.board.layout.is_grid() || !self.known_poses.is_empty();
+        Dealt::of_count(poses.len(), may_be_one_pose).map_or("pose", Dealt::word)
+    }
+
     /// Reads and checks a file.
     ///
     /// # Errors

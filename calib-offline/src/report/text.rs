@@ -51,7 +51,9 @@ pub fn summary(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
         lines.push(("central model", words::central_model(&checks.central_model)));
     }
     if let Some(choices) = &calibration.choices {
-        lines.push(("board's shape", words::board(choices)));
+        if calibration.board.layout.is_grid() {
+            lines.push(("board's shape", words::board(choices)));
+        }
         lines.push(("noise", words::noise(choices)));
     }
     for (camera, baseline_mm) in facts.cameras.iter().skip(1).zip(&facts.baseline_mm) {
@@ -129,8 +131,13 @@ fn held_out(calibration: &Calibration, facts: &Facts) -> String {
     if let (Some(percent), Some(mm)) = (facts.held_out_neighbor_percent, facts.held_out_neighbor_mm)
     {
         parts.push(format!(
-            "{} % of the square between neighboring corners ({} mm of {} mm)",
+            "{} % of the {} between neighboring corners ({} mm of {} mm)",
             short(percent),
+            if calibration.board.layout.is_grid() {
+                "square"
+            } else {
+                "spacing"
+            },
             short(mm),
             calibration.board.square_mm
         ));
@@ -153,9 +160,10 @@ fn held_out(calibration: &Calibration, facts: &Facts) -> String {
         }
     };
     format!(
-        "{} (RMS, {} folds by pose{failed})",
+        "{} (RMS, {} folds by {}{failed})",
         parts.join(", "),
-        held_out.folds
+        held_out.folds,
+        calibration.dealt_word()
     )
 }
 

@@ -160,6 +160,7 @@ pub fn alternative(choice: &Choice, calibration: &Calibration) -> String {
     match choice.tried {
         Alternative::Offsets => "offsets: rays that need not meet in one point".to_owned(),
         Alternative::OffsetsFirst => "offsets before penalized polynomials".to_owned(),
+        Alternative::OffsetsAfresh => "offsets before any lens was fitted".to_owned(),
         Alternative::OffsetsForSpline => "offsets in place of the spline".to_owned(),
         Alternative::AllCentral => "all cameras central".to_owned(),
         Alternative::Lenses => "base lenses fitted anew".to_owned(),

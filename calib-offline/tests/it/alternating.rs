@@ -132,7 +132,7 @@ fn the_stage_is_found_where_it_stood() {
             .iter()
             .map(|pose| scene.true_poses[*pose])
             .collect();
-        let board = scene.settings.board;
+        let board = scene.settings.board.clone();
         let corners: Vec<_> = (0..board.corner_count())
             .map(|k| board.corner_in_board(k / board.cols, k % board.cols))
             .collect();

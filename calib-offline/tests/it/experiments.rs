@@ -179,11 +179,7 @@ fn a_method_that_fails_says_why_and_the_others_stand() {
     let home = tempfile::tempdir().unwrap();
     let folder = home.path().join("set");
     simulated(&folder, false, |settings| {
-        settings.board = BoardSpec {
-            rows: 5,
-            cols: 3,
-            square_mm: 30.0,
-        };
+        settings.board = BoardSpec::chessboard(5, 3, 30.0);
     });
     let found = evaluated(&folder);
     let failed: Vec<bool> = found.methods.iter().map(|m| m.failed.is_some()).collect();

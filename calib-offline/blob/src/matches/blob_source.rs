@@ -1,6 +1,6 @@
 //! Points from a blob, with the device's own f32 code.
 
-use calib_rays::measure::{Gap, Point, PointSource, Sighting, Status};
+use calib_rays::measure::{Gap, Point, PointSource, Sighting, Status, answering_of};
 use nalgebra::{Matrix3, Vector3};
 use ray_runtime::{MatchNoise, Measurement, PixelPoint, RayBlob};
 
@@ -63,6 +63,16 @@ impl PointSource for BlobSource<'_> {
     }
 
     fn point(&self, sightings: &[Sighting<f32>]) -> Result<Point<f32>, Status> {
+        let answering;
+        let sightings = if sightings.len() > 2 {
+            answering = answering_of(sightings, |sighting| {
+                let (camera_idx, pixel) = pixel(*sighting);
+                self.blob.lookup(camera_idx, pixel).is_ok()
+            });
+            &answering[..]
+        } else {
+            sightings
+        };
         // A blob knows pairs.
         let result = if let [a, b] = *sightings {
             self.pair(a, b)

@@ -24,7 +24,7 @@ pub fn pack(rig: &Rig, settings: &PackSettings) -> Result<Packed, PackError> {
         choose(&rig.cameras[idx], &bounds_px[idx])
     })?;
 
-    let frame = format!("board at pose {}", rig.datum_pose);
+    let frame = rig.frame();
     let mut parts = encode::BlobParts {
         identity: settings.identity,
         frame: &frame,

@@ -105,6 +105,7 @@ fn rig(cameras: Vec<CalibratedCamera>) -> Rig {
         uncertainty: Vec::new(),
         cameras,
         datum_pose: 0,
+        frame_is_known: false,
         match_noise_px: None,
     }
 }

@@ -75,6 +75,7 @@ fn golden_rig() -> Rig {
             },
         ],
         datum_pose: 0,
+        frame_is_known: false,
         match_noise_px: None,
     }
 }

@@ -12,7 +12,7 @@ pub mod levenberg;
 pub mod model;
 pub mod objective;
 pub mod observations;
-mod prediction;
+pub mod prediction;
 pub mod priors;
 pub mod residual;
 pub mod robust;

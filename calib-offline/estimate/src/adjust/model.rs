@@ -6,19 +6,22 @@ use calib_rays::field::knot_order::KnotOrder;
 use calib_rays::field::structured::StructuredBasis;
 use calib_rays::field::{RayField, SmoothMap};
 use calib_rays::geometry::RigidTransform;
+use calib_rays::observed::KnownPose;
 use nalgebra::{DVector, Vector2, Vector3};
 use std::ops::Range;
 
 /// Cameras, poses and board shape.
 ///
 /// During adjustment the rig frame is that of camera 0, so `cameras[0].camera_from_rig` is the
-/// identity and stays so.
+/// identity and stays so; unless poses are known beforehand: then it is the frame that they are known in.
 #[derive(Debug, Clone)]
 pub struct Model {
     /// In the dataset's order.
     pub cameras: Vec<CameraModel>,
     /// Per pose index of the observations.
     pub rig_from_board: Vec<RigidTransform>,
+    /// What is known of them beforehand, by pose index; shorter where nothing is known of the last ones.
+    pub known_poses: Vec<Option<KnownPose>>,
     /// The shape shared by all poses; without terms the board is flat.
     pub board_shape: BoardShape,
 }
@@ -109,7 +112,7 @@ pub struct CameraLayout {
     pub direction: Range<usize>,
     /// Amounts of the offset's polynomial, mm; empty for a central camera.
     pub offset: Range<usize>,
-    /// Rotation (rad) and translation (mm) of `camera_from_rig`; `None` for camera 0.
+    /// Rotation (rad) and translation (mm) of `camera_from_rig`; `None` for a camera that is the rig's frame.
     pub extrinsics: Option<Range<usize>>,
 }
 
@@ -125,6 +128,17 @@ pub struct Step {
 }
 
 impl Model {
+    /// Whether any pose is known beforehand, and the rig's frame with it.
+    pub fn has_known_poses(&self) -> bool {
+        self.known_poses.iter().any(Option::is_some)
+    }
+
+    /// Index of the pose whose board frame users get as the rig's: the first, the datum; `None` where poses are
+    /// known, as their frame is the rig's.
+    pub fn frame_pose(&self) -> Option<usize> {
+        (!self.has_known_poses()).then_some(0)
+    }
+
     /// Whether any camera's direction has a spline.
     pub fn has_spline(&self) -> bool {
         self.cameras
@@ -146,7 +160,7 @@ impl Model {
             .map(|(idx, camera)| CameraLayout {
                 direction: take(camera.basis.len()),
                 offset: take(camera.offset().map_or(0, |(_, basis)| basis.len())),
-                extrinsics: (idx > 0).then(|| take(6)),
+                extrinsics: (idx > 0 || self.has_known_poses()).then(|| take(6)),
             })
             .collect();
         let board = take(self.board_shape.terms.len());

@@ -7,8 +7,9 @@ use calib_rays::field::spline::AxisWeights;
 use calib_rays::field::{BaseLens, CoverageMask, FieldSample, RayField};
 use calib_rays::geometry::{PixelPoint, SensorSize};
 use calib_rays::numerics::median;
-use calib_rays::observed::{Corner, View};
+use calib_rays::observed::{Corner, KnownPose, View};
 use nalgebra::{DMatrix, Matrix2, Vector2, Vector3};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Corners that are predicted farther away are outliers and keep their place.
@@ -26,6 +27,8 @@ pub struct Observations {
     pub board: BoardSpec,
     /// Standard deviation of each coefficient of its shape before anything is seen, mm.
     pub board_shape_sd_mm: f64,
+    /// Poses that are known beforehand, by number.
+    pub known_poses: BTreeMap<usize, KnownPose>,
     /// Sensor per camera.
     pub sensors: Vec<SensorSize>,
     /// Numbers of the poses, rising; a pose's index here is its index everywhere in `adjust`.
@@ -114,6 +117,7 @@ impl Observations {
         Self {
             board,
             board_shape_sd_mm: BOARD_SHAPE_SD_MM,
+            known_poses: BTreeMap::new(),
             sensors,
             poses,
             views: blocks,
@@ -146,6 +150,76 @@ impl Observations {
             self.board_shape_sd_mm = sd_mm.max(FLATTEST_MM);
         }
         self
+    }
+
+    /// The same of poses of which some are known beforehand, by number.
+    #[must_use]
+    pub fn with_known_poses(mut self, known_poses: BTreeMap<usize, KnownPose>) -> Self {
+        self.known_poses = known_poses;
+        self.known_poses
+            .retain(|pose, _| self.poses.binary_search(pose).is_ok());
+        self
+    }
+
+    /// What is known beforehand of each pose, by index; of a pose that was split, of its first part.
+    pub fn known_of_poses(&self) -> Vec<Option<KnownPose>> {
+        let poses = self.poses.iter().enumerate();
+        poses
+            .map(|(idx, pose)| {
+                let is_first = idx == 0 || self.poses[idx - 1] != *pose;
+                self.known_poses.get(pose).filter(|_| is_first).copied()
+            })
+            .collect()
+    }
+
+    /// The same with all poses that are known as one: their points where they stood, in the frame of the known
+    /// poses, under the number of the first. Several known places of a flat target are one solid target.
+    pub fn with_known_as_one(&self) -> Self {
+        let Some(first) = self.known_poses.keys().next() else {
+            return self.clone();
+        };
+        let is_known = |pose: &usize| self.known_poses.contains_key(pose);
+        let mut poses: Vec<usize> = self
+            .poses
+            .iter()
+            .copied()
+            .filter(|p| !is_known(p))
+            .collect();
+        poses.push(*first);
+        poses.sort_unstable();
+        poses.dedup();
+        let mut views: Vec<ViewBlock> = Vec::new();
+        for view in &self.views {
+            let number = self.poses[view.pose_idx];
+            let known = self.known_poses.get(&number);
+            let pose = if known.is_some() { *first } else { number };
+            let Ok(pose_idx) = poses.binary_search(&pose) else {
+                continue;
+            };
+            let mut corners = view.corners.clone();
+            if let Some(known) = known {
+                for corner in &mut corners {
+                    corner.point_in_board = known.rig_from_board.point(&corner.point_in_board);
+                }
+            }
+            let same = |other: &ViewBlock| {
+                (other.camera_idx, other.pose_idx) == (view.camera_idx, pose_idx)
+            };
+            match views.iter().position(same) {
+                Some(at) => views[at].corners.append(&mut corners),
+                None => views.push(ViewBlock {
+                    camera_idx: view.camera_idx,
+                    pose_idx,
+                    corners,
+                }),
+            }
+        }
+        views.sort_by_key(|view| (view.camera_idx, view.pose_idx));
+        Self {
+            poses,
+            views,
+            ..self.clone()
+        }
     }
 
     /// Number of different poses; one that was split counts once.
@@ -203,12 +277,28 @@ impl Observations {
             })
             .collect();
         Self {
-            board: self.board,
+            board: self.board.clone(),
             board_shape_sd_mm: self.board_shape_sd_mm,
+            known_poses: self.known_poses.clone(),
             sensors: self.sensors.clone(),
             poses: kept.iter().map(|idx| self.poses[*idx]).collect(),
             views,
         }
+    }
+
+    /// The corners with some labels (row, column) only, of all views.
+    pub fn with_labels(&self, keep: impl Fn(usize, usize) -> bool) -> Self {
+        let mut selected = self.clone();
+        for view in &mut selected.views {
+            view.corners.retain(|corner| keep(corner.row, corner.col));
+        }
+        selected.views.retain(|view| !view.corners.is_empty());
+        selected
+    }
+
+    /// Whether a single pose may determine everything: points that lie in no plane, or poses that are known.
+    pub fn may_be_one_pose(&self) -> bool {
+        !self.board.layout.is_grid() || !self.known_poses.is_empty()
     }
 
     /// The views of one camera only, as camera 0; poses it did not see are dropped.

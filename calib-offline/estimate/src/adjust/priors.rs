@@ -3,8 +3,9 @@
 
 use super::equations::knots::thin_plate;
 use super::model::{CameraModel, Model};
+use calib_rays::geometry::so3;
 use calib_rays::numerics::banded::BandedMatrix;
-use nalgebra::DVector;
+use nalgebra::{DVector, Vector6};
 use std::sync::Arc;
 
 /// Inverse variances of the parameters that smoothness or plausibility holds back.
@@ -14,6 +15,45 @@ pub struct Priors {
     pub cameras: Vec<CameraPriors>,
     /// Of each coefficient of the board's shape, 1/mm^2.
     pub board: f64,
+}
+
+/// A pose that counts as exact is known so well: nothing that is measured tells it from one that is.
+const EXACT_MM: f64 = 1e-5;
+const EXACT_RAD: f64 = 1e-8;
+
+/// How far a pose is from where it is known to be.
+#[derive(Debug, Clone, Copy)]
+pub struct FromKnown {
+    /// By the step of a pose: rotation vector (rad), translation (mm).
+    pub change: Vector6<f64>,
+    /// Inverse variance of each.
+    pub weight: Vector6<f64>,
+}
+
+impl FromKnown {
+    fn cost(&self) -> f64 {
+        self.change.map(|x| x * x).dot(&self.weight)
+    }
+}
+
+/// The poses of a model that are known beforehand, by index.
+pub fn known_poses(model: &Model) -> impl Iterator<Item = (usize, FromKnown)> + '_ {
+    let poses = model.rig_from_board.iter().zip(&model.known_poses);
+    poses.enumerate().filter_map(|(pose_idx, (pose, known))| {
+        let known = known.as_ref()?;
+        let at = &known.rig_from_board;
+        let turned = so3::log(&(pose.rotation * at.rotation.transpose()));
+        let moved = pose.translation_mm - at.translation_mm;
+        let rad = known.sigma_rad.max(EXACT_RAD).powi(-2);
+        let mm = known.sigma_mm.max(EXACT_MM).powi(-2);
+        Some((
+            pose_idx,
+            FromKnown {
+                change: Vector6::new(turned.x, turned.y, turned.z, moved.x, moved.y, moved.z),
+                weight: Vector6::new(rad, rad, rad, mm, mm, mm),
+            },
+        ))
+    })
 }
 
 /// Priors of one camera.
@@ -77,6 +117,7 @@ impl Priors {
             .map(|(camera, priors)| priors.cost(camera))
             .sum();
         let board: f64 = model.board_shape.terms.iter().map(|t| t.2 * t.2).sum();
-        cameras + self.board * board
+        let poses: f64 = known_poses(model).map(|(_, known)| known.cost()).sum();
+        cameras + self.board * board + poses
     }
 }

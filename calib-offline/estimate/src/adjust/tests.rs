@@ -16,11 +16,7 @@ use calib_rays::geometry::{PixelPoint, RigidTransform, SensorSize, so3};
 use nalgebra::{DMatrix, DVector, Vector2, Vector3, Vector6};
 
 const SENSOR: SensorSize = SensorSize::new(400, 300);
-const BOARD: BoardSpec = BoardSpec {
-    rows: 6,
-    cols: 7,
-    square_mm: 10.0,
-};
+const BOARD: BoardSpec = BoardSpec::chessboard(6, 7, 10.0);
 
 /// A number that looks random, between -1 and 1.
 fn wild(k: usize) -> f64 {
@@ -91,6 +87,7 @@ fn example(has_spline: [bool; 2]) -> (Model, Observations) {
                 RigidTransform::new(rotation, middle - rotation * BOARD.center_in_board())
             })
             .collect(),
+        known_poses: Vec::new(),
         board_shape,
     };
     let mut views = Vec::new();
@@ -140,6 +137,7 @@ fn example(has_spline: [bool; 2]) -> (Model, Observations) {
     let observations = Observations {
         board: BOARD,
         board_shape_sd_mm: BOARD_SHAPE_SD_MM,
+        known_poses: [].into(),
         sensors: vec![SENSOR; 2],
         poses: (0..model.rig_from_board.len()).collect(),
         views,

@@ -301,7 +301,7 @@ fn stage_circles(
     placement: &dyn Fn(usize) -> Option<usize>,
     datum: usize,
 ) -> (Vec<PlacementCircles>, Vec<Option<RigidTransform>>) {
-    let board = observations.board;
+    let board = &observations.board;
     let corners: Vec<Vector3<f64>> = (0..board.corner_count())
         .map(|k| board.corner_in_board(k / board.cols, k % board.cols))
         .collect();

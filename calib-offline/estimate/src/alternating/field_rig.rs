@@ -75,6 +75,7 @@ impl AlternatingEstimate {
             rig: Rig {
                 cameras,
                 datum_pose: self.observations.poses.get(self.datum).copied()?,
+                frame_is_known: false,
                 match_noise_px: None,
                 uncertainty: Vec::new(),
             },

@@ -84,7 +84,7 @@ fn in_first_camera(rig: &PinholeRig) -> Start {
 
 /// Each camera's own poses in the frame of the first, then one pose per board (31, 32).
 fn averaged(observations: &Observations, fits: &[CameraFit], mean: Mean) -> Option<Start> {
-    let board = observations.board;
+    let board = &observations.board;
     let corners: Vec<Vector3<f64>> = [
         (0, 0),
         (0, board.cols - 1),

@@ -122,7 +122,7 @@ impl Explained {
         let Some(plain) = self.plain() else {
             return vec![self];
         };
-        let (candidate, _) = choice::choose(plain.candidate.clone(), &self.observations);
+        let (candidate, _) = choice::choose(plain.candidate.clone(), None, &self.observations);
         let best = if candidate.evidence > self.candidate.evidence {
             Self {
                 candidate,

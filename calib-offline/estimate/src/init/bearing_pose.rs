@@ -1,17 +1,27 @@
-//! Where a flat board is, from the bearings of its corners: valid for any field of view.
+//! Where a target is, from the bearings of its corners: valid for any field of view. A printed face is flat
+//! and lies at z = 0; points with known places may lie anywhere.
 
-use calib_rays::geometry::{RigidTransform, so3};
+use super::solid_pose::solid_pose;
+use calib_rays::geometry::{RigidTransform, Scatter, so3};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 /// Corners closer to one line than this share of their extent do not place a board.
 const MIN_FLATNESS: f64 = 1e-3;
+/// Points that lie within this share of their extent of the plane z = 0 are a printed face, bent or not.
+const FACE: f64 = 0.03;
 
-/// Whether planar points lie on one line (or in one spot), so that they cannot place a board.
+/// Whether points lie on one line (or in one spot), so that they cannot place a target.
 pub fn is_collinear(points: &[Vector3<f64>]) -> bool {
-    let Some((_, scale, spread)) = centroid_and_spread(points) else {
-        return true;
-    };
-    spread <= MIN_FLATNESS * scale
+    if is_face(points) {
+        return centroid_and_spread(points)
+            .is_none_or(|(_, scale, spread)| spread <= MIN_FLATNESS * scale);
+    }
+    Scatter::of(points).is_line()
+}
+
+fn is_face(points: &[Vector3<f64>]) -> bool {
+    let highest = points.iter().map(|p| p.z.abs()).fold(0.0, f64::max);
+    centroid_and_spread(points).is_some_and(|(_, scale, _)| highest <= FACE * scale)
 }
 
 /// Centroid, RMS extent, and RMS extent across the best line through the points.
@@ -128,16 +138,44 @@ impl BoardHomography {
     }
 }
 
-/// `camera_from_board` of a flat board and the RMS angle (rad) that its corners miss their
+/// `camera_from_board` of a target and the RMS angle (rad) that its corners miss their
 /// bearings by.
 ///
-/// From the [`BoardHomography`] of the bearings, which need not be unit vectors. `None` if the
-/// corners lie on a line or the system is degenerate.
+/// From the [`BoardHomography`] of the bearings, which need not be unit vectors, in the target's best plane, or
+/// from all three coordinates where its points lie in none. `None` if the corners lie on a line or the system is
+/// degenerate.
 pub fn bearing_pose(
     bearings: &[Vector3<f64>],
     points_in_board: &[Vector3<f64>],
 ) -> Option<(RigidTransform, f64)> {
-    let pose = BoardHomography::fit(bearings, points_in_board)?.pose()?;
+    if is_face(points_in_board) {
+        let pose = BoardHomography::fit(bearings, points_in_board)?.pose()?;
+        return with_rms_angle(pose, bearings, points_in_board);
+    }
+    let scatter = Scatter::of(points_in_board);
+    let plane_from_target = scatter.plane_from_points();
+    let in_plane: Vec<_> = points_in_board
+        .iter()
+        .map(|p| plane_from_target.point(p))
+        .collect();
+    let flat = || {
+        let pose = BoardHomography::fit(bearings, &in_plane)?.pose()?;
+        with_rms_angle(pose * plane_from_target, bearings, points_in_board)
+    };
+    let solid = || {
+        let pose = solid_pose(bearings, &in_plane)?;
+        with_rms_angle(pose * plane_from_target, bearings, points_in_board)
+    };
+    let found = [flat(), scatter.is_solid().then(solid).flatten()];
+    let found = found.into_iter().flatten();
+    found.min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+fn with_rms_angle(
+    pose: RigidTransform,
+    bearings: &[Vector3<f64>],
+    points_in_board: &[Vector3<f64>],
+) -> Option<(RigidTransform, f64)> {
     let squared: f64 = bearings
         .iter()
         .zip(points_in_board)
@@ -156,13 +194,9 @@ mod tests {
     use calib_rays::board::BoardSpec;
 
     fn corners() -> Vec<Vector3<f64>> {
-        let board = BoardSpec {
-            rows: 7,
-            cols: 9,
-            square_mm: 12.0,
-        };
-        (0..7)
-            .flat_map(|row| (0..9).map(move |col| board.corner_in_board(row, col)))
+        let board = BoardSpec::chessboard(7, 9, 12.0);
+        (0..63)
+            .map(|k| board.corner_in_board(k / 9, k % 9))
             .collect()
     }
 

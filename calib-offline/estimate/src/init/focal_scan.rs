@@ -12,7 +12,7 @@ use crate::adjust::{CameraModel, Model, Observations};
 use calib_rays::board::BoardShape;
 use calib_rays::field::structured::StructuredBasis;
 use calib_rays::field::{BaseLens, Projection, RayField, transport};
-use calib_rays::geometry::{RigidTransform, SensorSize};
+use calib_rays::geometry::{RigidTransform, Scatter, SensorSize};
 use calib_rays::numerics::median;
 use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
@@ -23,6 +23,8 @@ const FOCAL_PER_WIDTH: (f64, f64) = (0.12, 12.0);
 const FOCAL_COUNT: usize = 44;
 /// Boards on which lenses are tried.
 const TRIAL_BOARDS: usize = 12;
+/// Corners of a view on which they are tried; beyond, more change no choice between lenses.
+const TRIAL_CORNERS: usize = 600;
 /// Candidates that are refined: the angular score alone is not reliable (METHOD section 3).
 const REFINED: usize = 5;
 /// Two candidates of one kind are distinct beyond this ratio of focal lengths (logarithm).
@@ -68,14 +70,17 @@ pub fn start_camera(
         .filter(|view| is_usable(view))
         .map(|view| view.pose_idx)
         .collect();
-    if usable.len() < MIN_POSES {
+    if usable.len() < needed_poses(observations) {
         return Err(InitError::TooFewPoses {
             camera_idx,
             have: usable.len(),
         });
     }
     let trial_poses = trial_poses(observations, &usable);
-    let trial = observations.with_poses(|pose| trial_poses.contains(&pose));
+    let mut trial = observations.with_poses(|pose| trial_poses.contains(&pose));
+    for view in &mut trial.views {
+        thin(view);
+    }
     let refined = scan(&trial, sensor)
         .par_iter()
         .filter_map(|candidate| refine(&trial, sensor, candidate))
@@ -102,6 +107,16 @@ pub fn start_camera(
     }
 }
 
+/// Fewest poses that determine a camera: one is enough if its points lie in no plane.
+fn needed_poses(observations: &Observations) -> usize {
+    let solid = |view: &ViewBlock| is_usable(view) && Scatter::of(&points_of(view)).is_solid();
+    if observations.views.iter().any(solid) {
+        1
+    } else {
+        MIN_POSES
+    }
+}
+
 /// Poses evenly spread over those that show at least the median number of corners.
 fn trial_poses(observations: &Observations, usable: &[usize]) -> Vec<usize> {
     let count = |pose_idx: usize| {
@@ -123,6 +138,13 @@ fn trial_poses(observations: &Observations, usable: &[usize]) -> Vec<usize> {
     (0..wanted)
         .map(|k| observations.poses[rich[k * rich.len() / wanted]])
         .collect()
+}
+
+/// Leaves every so many corners of a view of very many.
+fn thin(view: &mut ViewBlock) {
+    let stride = view.corners.len().div_ceil(TRIAL_CORNERS).max(1);
+    let corners = view.corners.iter().step_by(stride).copied().collect();
+    view.corners = corners;
 }
 
 /// The distinct ideal lenses that explain the trial boards best.
@@ -222,6 +244,7 @@ fn adjust_cubic(
     let mut model = Model {
         cameras: vec![camera],
         rig_from_board: poses,
+        known_poses: Vec::new(),
         board_shape: BoardShape::default(),
     };
     let bases = model.view_bases(observations);
@@ -268,7 +291,7 @@ fn place_all(
         .filter(|(_, pose)| pose.is_some())
         .map(|(view, _)| observations.poses[view.pose_idx])
         .collect();
-    if kept.len() < MIN_POSES {
+    if kept.len() < needed_poses(observations) {
         return Err(InitError::TooFewPoses {
             camera_idx,
             have: kept.len(),

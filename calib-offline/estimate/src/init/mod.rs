@@ -16,6 +16,7 @@ pub mod pair_consensus;
 mod parallel_rays;
 pub mod rig;
 pub mod screening;
+mod solid_pose;
 mod usable;
 
 pub use calib_rays::observed::MIN_POSES;

@@ -71,8 +71,11 @@ pub struct Reading {
 }
 
 /// The board turned by half a turn in its plane: from the frame of the labels that count from one
-/// end to that of the labels that count from the other.
+/// end to that of the labels that count from the other. Listed places have no other end: no turn.
 pub fn half_turn(board: &BoardSpec) -> RigidTransform {
+    if !board.layout.is_grid() {
+        return RigidTransform::identity();
+    }
     RigidTransform::new(
         Matrix3::from_diagonal(&Vector3::new(-1.0, -1.0, 1.0)),
         2.0 * board.center_in_board(),

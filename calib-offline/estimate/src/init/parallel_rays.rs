@@ -3,8 +3,9 @@
 use super::is_usable;
 use crate::adjust::Observations;
 use crate::adjust::observations::ViewBlock;
+use calib_rays::geometry::Scatter;
 use calib_rays::numerics::median;
-use nalgebra::{Matrix3, Matrix3x2, Vector3};
+use nalgebra::{SMatrix, SVector, Vector3};
 
 /// Median length of the residual vectors, px, if every board is mapped to the image by the best
 /// affine map; `None` if no view can say.
@@ -17,13 +18,23 @@ pub fn affine_median_px(observations: &Observations) -> Option<f64> {
 }
 
 fn affine_residuals_px(view: &ViewBlock) -> Option<Vec<f64>> {
-    let on_board = |k: usize| {
-        let point = view.corners[k].point_in_board;
-        Vector3::new(point.x, point.y, 1.0)
-    };
-    let (mut normal, mut right) = (Matrix3::zeros(), Matrix3x2::zeros());
+    let points: Vec<_> = view.corners.iter().map(|c| c.point_in_board).collect();
+    if Scatter::of(&points).is_solid() {
+        residuals_px(view, |k| points[k].push(1.0))
+    } else {
+        residuals_px(view, |k| Vector3::new(points[k].x, points[k].y, 1.0))
+    }
+}
+
+/// Lengths of the residual vectors of the map from `N` coordinates.
+fn residuals_px<const N: usize>(
+    view: &ViewBlock,
+    on_target: impl Fn(usize) -> SVector<f64, N>,
+) -> Option<Vec<f64>> {
+    let mut normal = SMatrix::<f64, N, N>::zeros();
+    let mut right = SMatrix::<f64, N, 2>::zeros();
     for (k, corner) in view.corners.iter().enumerate() {
-        let x = on_board(k);
+        let x = on_target(k);
         normal += x * x.transpose();
         right.column_mut(0).axpy(corner.pixel.u, &x, 1.0);
         right.column_mut(1).axpy(corner.pixel.v, &x, 1.0);
@@ -34,7 +45,7 @@ fn affine_residuals_px(view: &ViewBlock) -> Option<Vec<f64>> {
             .iter()
             .enumerate()
             .map(|(k, corner)| {
-                let seen = map.tr_mul(&on_board(k));
+                let seen = map.tr_mul(&on_target(k));
                 (corner.pixel.u - seen.x).hypot(corner.pixel.v - seen.y)
             })
             .collect(),

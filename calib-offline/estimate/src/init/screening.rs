@@ -322,7 +322,7 @@ impl Screening<'_> {
             } else {
                 (view, camera_idx, reference)
             };
-        let board = self.observations.board;
+        let board = &self.observations.board;
         let block = &mut self.views[turned];
         for corner in &mut block.corners {
             (corner.row, corner.col) = board.half_turned(corner.row, corner.col);
@@ -339,14 +339,14 @@ impl Screening<'_> {
             },
         });
         if let Some(fit) = &mut self.fits[turned] {
-            fit.camera_from_board = fit.camera_from_board * half_turn(&board);
+            fit.camera_from_board = fit.camera_from_board * half_turn(board);
         }
         let founded = self.groups.founder[pose_idx]
             .iter()
             .position(|founder| *founder == turned);
         if let Some(group) = founded {
             let place = &mut self.groups.rig_from_board[pose_idx][group];
-            *place = *place * half_turn(&board);
+            *place = *place * half_turn(board);
         }
     }
 
@@ -377,8 +377,9 @@ impl Screening<'_> {
         self.found_groups();
         let old = self.observations;
         let mut observations = Observations {
-            board: old.board,
+            board: old.board.clone(),
             board_shape_sd_mm: old.board_shape_sd_mm,
+            known_poses: old.known_poses.clone(),
             sensors: old.sensors.clone(),
             poses: Vec::new(),
             views: Vec::new(),

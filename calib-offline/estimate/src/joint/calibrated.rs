@@ -6,7 +6,7 @@ use calib_rays::geometry::RigidTransform;
 use nalgebra::Vector3;
 
 impl Estimate {
-    /// The calibrated rig. The datum is the first pose used; the calibrated area of a camera is
+    /// The calibrated rig. The datum is the first pose used, or the frame of poses that are known; the calibrated area of a camera is
     /// that of the corners that count.
     ///
     /// `names` are those of the cameras, in order.
@@ -21,12 +21,13 @@ impl Estimate {
                 name: name.clone(),
                 coverage: self.coverage(camera_idx),
                 field: camera.field.clone(),
-                rig_from_camera: self.datum_from_first_camera() * camera.camera_from_rig.inverse(),
+                rig_from_camera: self.datum_from_model() * camera.camera_from_rig.inverse(),
             })
             .collect();
         Rig {
             cameras,
             datum_pose: self.observations.poses.first().copied().unwrap_or(0),
+            frame_is_known: self.model.has_known_poses(),
             match_noise_px: None,
             uncertainty: Vec::new(),
         }
@@ -34,7 +35,7 @@ impl Estimate {
 
     /// Per pose of the observations, in the rig's frame.
     pub fn rig_from_board(&self) -> Vec<RigidTransform> {
-        let datum = self.datum_from_first_camera();
+        let datum = self.datum_from_model();
         self.model
             .rig_from_board
             .iter()
@@ -57,10 +58,11 @@ impl Estimate {
         distances
     }
 
-    fn datum_from_first_camera(&self) -> RigidTransform {
-        self.model
-            .rig_from_board
-            .first()
+    /// From the frame of the model to the one that users get.
+    pub(super) fn datum_from_model(&self) -> RigidTransform {
+        let frame_pose = self.model.frame_pose();
+        frame_pose
+            .and_then(|pose_idx| self.model.rig_from_board.get(pose_idx))
             .map_or_else(RigidTransform::identity, RigidTransform::inverse)
     }
 

@@ -3,11 +3,12 @@
 //! has a picture of what is tried after which.
 
 use super::error::EstimateError;
-use super::evidence::Family;
+use super::evidence::{Family, Smoothness};
 use super::fit::Fit;
 use super::pinhole_lens::are_pinholes;
 use super::pinholes::pinholes;
 use super::rebase::rebase;
+use crate::adjust::levenberg::Settings;
 use crate::adjust::{CameraModel, Model, Observations};
 use calib_rays::field::spline::{Spline, SplineGrid};
 use calib_rays::field::structured::TILT_DEGREE;
@@ -23,6 +24,8 @@ const FINER_CELLS: [f64; 2] = [32.0, 46.0];
 const OFFSET_DEGREE: usize = 7;
 /// Share of a spline's numbers that the data determine, above which a finer one is tried.
 const USED_UP: f64 = 0.6;
+/// The same share, below which the spline itself is asked whether it is needed.
+const IDLE: f64 = 0.01;
 /// Rounds after a change of the model, at most; twice as many if it is the best so far.
 const ROUNDS: usize = 8;
 /// A round that changes twice the log evidence by less settles the fit.
@@ -37,6 +40,11 @@ const HOPELESS_CHANGES: f64 = 10.0;
 /// and Raftery (1995). Ties go to the simpler model.
 pub const NEEDED_GAIN: f64 = 4.0;
 
+/// The adjustment after base lenses were fitted anew.
+const RENEWED: Settings = Settings {
+    max_iterations: 15,
+    relative_decrease: 1e-4,
+};
 /// How often the base lenses are fitted anew at this stage, at most.
 const MOST_REBASES: usize = 3;
 
@@ -50,6 +58,8 @@ pub enum Alternative {
     OffsetsFirst,
     /// The same, and the splines go.
     OffsetsForSpline,
+    /// The same from the lenses as they were before they were fitted anew as if central.
+    OffsetsAfresh,
     /// The lenses underneath are fitted anew, as offsets explain part of what they did.
     Lenses,
     /// Every camera's direction gets a spline, or one of another spacing.
@@ -134,14 +144,22 @@ impl Candidate {
     }
 }
 
-/// Takes what the evidence asks for, starting from a settled fit without spline and offset.
-pub fn choose(start: Candidate, observations: &Observations) -> (Candidate, Vec<Choice>) {
+/// Takes what the evidence asks for, starting from a settled fit without spline and offset. `ideal` is the fit before
+/// its lenses were fitted anew, if that is to be gone back to.
+pub fn choose(
+    start: Candidate,
+    ideal: Option<&Fit>,
+    observations: &Observations,
+) -> (Candidate, Vec<Choice>) {
     let mut search = Search {
         best: start,
         tried: Vec::new(),
         observations,
     };
     search.structure();
+    if let Some(ideal) = ideal {
+        search.offsets_afresh(ideal);
+    }
     for cells in FINER_CELLS {
         if !search.spline_is_used_up() || !search.spline(cells) {
             break;
@@ -208,6 +226,13 @@ impl Search<'_> {
         })
     }
 
+    /// Whether the data determine next to nothing of any spline: what is left of it only costs bytes.
+    fn spline_is_idle(&self) -> bool {
+        let found = self.best.fit.smoothness.found(&self.best.fit.model);
+        let mut splines = found.iter().filter(|found| found.family == Family::Spline);
+        splines.all(|found| found.effective < IDLE * found.parameters as f64)
+    }
+
     fn spline(&mut self, cells: f64) -> bool {
         self.take_if_better(Alternative::Spline { cells }, NEEDED_GAIN, |model| {
             set_spline(model, cells);
@@ -235,12 +260,38 @@ impl Search<'_> {
         self.take_if_better(Alternative::OffsetsForSpline, 0.0, add_offsets)
     }
 
+    /// Where offsets and a spline both seem needed, the lens underneath may be to blame: fitted as if all rays met
+    /// in a point, it bends after what they do not. So offsets are tried once from where no lens was fitted yet.
+    fn offsets_afresh(&mut self, ideal: &Fit) {
+        let model = &self.best.fit.model;
+        let is_central = model.cameras.iter().all(|camera| camera.offset().is_none());
+        if is_central || !model.has_spline() {
+            return;
+        }
+        let mut fit = ideal.clone();
+        fit.smoothness = Smoothness::new(&fit.model);
+        let mut fit = fit.changed(self.observations, add_offsets);
+        fit.smoothness.put_offsets_first();
+        // It comes from far, and would be given up before its offsets are where they can be.
+        let from_far = Candidate::settle(fit, f64::NEG_INFINITY, self.observations);
+        let Ok(Candidate { fit, .. }) = from_far else {
+            return;
+        };
+        if self.take_fit_if_better(Alternative::OffsetsAfresh, NEEDED_GAIN, fit) {
+            self.spline(FIRST_CELLS);
+        }
+    }
+
     /// Base lenses that were fitted as if central hold part of what offsets explain.
     fn lenses(&mut self) {
         let observations = self.observations;
         for _ in 0..MOST_REBASES {
             let renew = |model: &mut Model| rebase(model, observations);
-            if !self.take_if_better(Alternative::Lenses, NEEDED_GAIN, renew) {
+            let mut fit = self.best.fit.changed(observations, renew);
+            // The frame turned with the lens, and offsets are along its axes: rounds of single steps would give the
+            // new lens up before it is where it can be.
+            fit.adjust(observations, RENEWED);
+            if !self.take_fit_if_better(Alternative::Lenses, NEEDED_GAIN, fit) {
                 break;
             }
         }
@@ -308,7 +359,7 @@ impl Search<'_> {
             }
         }
         let changed = remaining < with_offset.len();
-        if self.best.fit.model.has_spline() && changed {
+        if self.best.fit.model.has_spline() && (changed || self.spline_is_idle()) {
             self.drop_spline();
         }
         self.plain();

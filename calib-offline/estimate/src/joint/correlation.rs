@@ -31,7 +31,7 @@ pub fn neighbor_correlation(
             let Some(here) = by_label.get(&(corner.row, corner.col)) else {
                 continue;
             };
-            for neighbor in [(corner.row + 1, corner.col), (corner.row, corner.col + 1)] {
+            for neighbor in observations.board.next_to(corner.row, corner.col) {
                 let Some(there) = by_label.get(&neighbor) else {
                     continue;
                 };

@@ -51,9 +51,14 @@ impl Estimate {
             }
             let sightings: Vec<Sighting> =
                 nodes.iter().flatten().map(|node| node.sighting).collect();
-            // The datum is the first pose.
-            let covariance =
-                sighting_covariance(&self.model, &layout, &equations, &reduced, 0, &sightings);
+            let covariance = sighting_covariance(
+                &self.model,
+                &layout,
+                &equations,
+                &reduced,
+                self.model.frame_pose(),
+                &sightings,
+            );
             let Some((covariance, by_point)) = covariance else {
                 continue;
             };

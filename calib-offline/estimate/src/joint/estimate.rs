@@ -6,12 +6,12 @@ use super::evidence::{Smoothness, SmoothnessFound};
 use super::fit::{Fit, LAST};
 use super::pinhole_lens::are_pinholes;
 use super::pinholes::among_pinholes;
+use super::places::weighted_by_places;
 use super::rebase::rebase;
 use crate::adjust::levenberg::Settings;
 use crate::adjust::robust::{StudentT, relative_weights};
 use crate::adjust::{CameraModel, Model, Observations, StopReason};
 use crate::init::rig::RigStart;
-use calib_rays::board::BoardShape;
 use calib_rays::field::polynomial::term_count;
 use calib_rays::field::structured::StructuredBasis;
 use nalgebra::Vector2;
@@ -65,9 +65,9 @@ pub struct Estimate {
 /// # Errors
 /// [`EstimateError::Singular`] if the data leave a parameter open.
 pub fn estimate(observations: &Observations, start: &RigStart) -> Result<Estimate, EstimateError> {
-    let observations =
+    let mut observations =
         observations.with_pose_indices(|pose_idx| start.rig_from_board[pose_idx].is_some());
-    let model = starting_model(start);
+    let model = starting_model(start, &observations);
 
     // What every lens may use, then where its center of distortion is.
     let smoothness = Smoothness::structured_only(&model);
@@ -76,8 +76,14 @@ pub fn estimate(observations: &Observations, start: &RigStart) -> Result<Estimat
     for _ in 0..STRUCTURED_ROUNDS {
         fit.adjust(&observations, STRUCTURED);
     }
+    let ideal = fit.clone();
     for _ in 0..BASE_ROUNDS {
         fit = fit.changed(&observations, |model| rebase(model, &observations));
+        fit.adjust(&observations, STRUCTURED);
+    }
+    if let Some(weighted) = weighted_by_places(&observations, &fit) {
+        observations = weighted;
+        fit = fit.on(&observations);
         fit.adjust(&observations, STRUCTURED);
     }
     fit.smoothness = Smoothness::new(&fit.model);
@@ -86,7 +92,7 @@ pub fn estimate(observations: &Observations, start: &RigStart) -> Result<Estimat
     // What the evidence asks for beyond, first as if corners were independent: only a field that
     // fits shows how much they are not.
     let settled = Candidate::settle(fit, f64::NEG_INFINITY, &observations)?;
-    let (mut best, mut choices) = choice::choose(settled, &observations);
+    let (mut best, mut choices) = choice::choose(settled, Some(&ideal), &observations);
     let correlation = best.fit.measure_correlation(&observations);
     if best.fit.share < 1.0 {
         best = Candidate::settle(best.fit, f64::NEG_INFINITY, &observations)?;
@@ -105,7 +111,7 @@ pub fn estimate(observations: &Observations, start: &RigStart) -> Result<Estimat
     Ok(finish(fit, observations, correlation, choices))
 }
 
-fn starting_model(start: &RigStart) -> Model {
+fn starting_model(start: &RigStart, observations: &Observations) -> Model {
     let cameras = start
         .fields
         .iter()
@@ -129,7 +135,8 @@ fn starting_model(start: &RigStart) -> Model {
     Model {
         cameras,
         rig_from_board: start.rig_from_board.iter().flatten().copied().collect(),
-        board_shape: BoardShape::flat_of_degree_two(),
+        known_poses: observations.known_of_poses(),
+        board_shape: start.observations.board.unknown_shape(),
     }
 }
 

@@ -259,7 +259,10 @@ impl Fit {
             .map(|camera| camera.spline_amounts().len())
             .sum();
         let free = layout.global_len + splines - held;
-        self.effective_parameters = free as f64 + effective + 6.0 * observations.poses.len() as f64;
+        // What is known beforehand uses nothing up.
+        let known = self.model.known_poses.iter().flatten().count();
+        let open_poses = observations.poses.len() - known.min(observations.poses.len());
+        self.effective_parameters = free as f64 + effective + 6.0 * open_poses as f64;
     }
 
     /// Log likelihood of the residuals under the distribution found.

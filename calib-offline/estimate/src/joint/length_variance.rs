@@ -104,9 +104,14 @@ impl Estimate {
             .iter()
             .flat_map(|form| form.nodes.iter().flatten().map(|node| node.sighting))
             .collect();
-        // The datum is the first pose.
-        let covariance =
-            sighting_covariance(&self.model, layout, equations, reduced, 0, &sightings);
+        let covariance = sighting_covariance(
+            &self.model,
+            layout,
+            equations,
+            reduced,
+            self.model.frame_pose(),
+            &sightings,
+        );
         let Some((covariance, _)) = covariance else {
             return vec![None; lengths.len()];
         };

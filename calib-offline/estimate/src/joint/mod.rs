@@ -12,6 +12,7 @@ pub mod fit;
 pub mod length_variance;
 pub mod pinhole_lens;
 pub mod pinholes;
+mod places;
 pub mod point_covariance;
 pub mod rebase;
 pub mod recheck;

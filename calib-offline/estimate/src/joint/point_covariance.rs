@@ -67,8 +67,14 @@ impl Estimate {
                 })
                 .collect();
             let sightings: Vec<_> = nodes.iter().map(|node| node.sighting).collect();
-            let (predictions, _) =
-                sighting_covariance(&self.model, &layout, &equations, &reduced, 0, &sightings)?;
+            let (predictions, _) = sighting_covariance(
+                &self.model,
+                &layout,
+                &equations,
+                &reduced,
+                self.model.frame_pose(),
+                &sightings,
+            )?;
             let mut to_mm = DMatrix::zeros(predictions.nrows(), predictions.ncols());
             let mut motions = DMatrix::zeros(predictions.nrows(), 6);
             for (k, node) in nodes.iter().enumerate() {
@@ -104,8 +110,14 @@ pub(super) fn shape_covariance(
         points.push(point);
     }
     let sightings: Vec<_> = nodes.iter().flatten().map(|node| node.sighting).collect();
-    // The datum is the first pose.
-    let (predictions, _) = sighting_covariance(model, layout, equations, reduced, 0, &sightings)?;
+    let (predictions, _) = sighting_covariance(
+        model,
+        layout,
+        equations,
+        reduced,
+        model.frame_pose(),
+        &sightings,
+    )?;
     let to_points = points_by_predictions(&nodes)?;
     let shape = without_motions(&rigid_motions(&points))? * to_points;
     Some(&shape * predictions * shape.transpose())

@@ -61,10 +61,10 @@ pub(super) fn seen_directions(
     (seen, reach_px)
 }
 
-/// Turns a camera's frame and, as the rig's frame is that of camera 0, everything else with that.
+/// Turns a camera's frame and, where the rig's frame is that of camera 0, everything else with that.
 pub(super) fn turn_camera(model: &mut Model, camera_idx: usize, new_from_old: &Matrix3<f64>) {
     let turn = RigidTransform::new(*new_from_old, Vector3::zeros());
-    if camera_idx > 0 {
+    if camera_idx > 0 || model.has_known_poses() {
         let camera_from_rig = &mut model.cameras[camera_idx].camera_from_rig;
         *camera_from_rig = turn * *camera_from_rig;
         return;

@@ -25,7 +25,13 @@ pub fn estimate_screened(
 ) -> Result<(Estimate, Vec<Finding>), EstimateError> {
     let mut start = start;
     let mut found = estimate(&start.observations, &start)?;
-    for _ in 0..MOST_REPEATS {
+    // A view of a known pose contradicts no other view, only what is known.
+    let repeats = if offered.known_poses.is_empty() {
+        MOST_REPEATS
+    } else {
+        0
+    };
+    for _ in 0..repeats {
         let fields: Vec<&RayField> = found.model.cameras.iter().map(|c| &c.field).collect();
         // Where the cameras contradict each other through the better fields, the start stands.
         let Ok(again) = screen(offered, &fields, &found.model.board_shape, FINE_LIMIT_SIGMA) else {

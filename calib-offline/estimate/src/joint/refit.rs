@@ -30,15 +30,36 @@ impl Estimate {
     /// [`EstimateError::Singular`] if those poses leave a parameter open.
     pub fn of_poses(&self, keep: impl Fn(usize) -> bool) -> Result<Self, EstimateError> {
         let observations = self.observations.with_poses(&keep);
-        let poses = self.observations.poses.iter();
+        let kept = || {
+            let poses = self.observations.poses.iter().enumerate();
+            poses.filter(|(_, pose)| keep(**pose)).map(|(idx, _)| idx)
+        };
+        let known = |idx: usize| self.model.known_poses.get(idx).copied().flatten();
         let model = Model {
-            rig_from_board: poses
-                .zip(&self.model.rig_from_board)
-                .filter(|(pose, _)| keep(**pose))
-                .map(|(_, rig_from_board)| *rig_from_board)
-                .collect(),
+            rig_from_board: kept().map(|idx| self.model.rig_from_board[idx]).collect(),
+            known_poses: kept().map(known).collect(),
             ..self.model.clone()
         };
+        self.of_part(model, observations)
+    }
+
+    /// The same from the points with some labels (row, column) only, of all poses.
+    ///
+    /// # Errors
+    /// [`EstimateError::Singular`] if those points leave a parameter open.
+    pub fn of_points(&self, keep: impl Fn(usize, usize) -> bool) -> Result<Self, EstimateError> {
+        self.of_part(self.model.clone(), self.observations.with_labels(keep))
+    }
+
+    /// The same from a part of its own points: `observations` are its own but for corners that are left out.
+    ///
+    /// # Errors
+    /// [`EstimateError::Singular`] if those points leave a parameter open.
+    pub fn of_part_of_points(&self, observations: Observations) -> Result<Self, EstimateError> {
+        self.of_part(self.model.clone(), observations)
+    }
+
+    fn of_part(&self, model: Model, observations: Observations) -> Result<Self, EstimateError> {
         let mut fit = Fit::new(model, self.fit.smoothness.clone(), &observations);
         fit.share = self.fit.share;
         let settled = settled(fit, &observations)?;
@@ -66,7 +87,8 @@ impl Estimate {
 
     /// Numbers that the data determine, poses apart.
     pub fn freedom(&self) -> f64 {
-        self.fit.effective_parameters() - 6.0 * self.observations.poses.len() as f64
+        let known = self.model.known_poses.iter().flatten().count();
+        self.fit.effective_parameters() - 6.0 * (self.observations.poses.len() - known) as f64
     }
 
     /// The estimate with another fit, of the same choices.
@@ -85,11 +107,11 @@ impl Estimate {
     pub fn board_peak_to_valley_mm(&mut self) -> Result<(f64, f64), EstimateError> {
         let (layout, _, reduced) = self.fit.equations(&self.observations)?;
         let variances = reduced.marginal_variances();
-        let board = self.observations.board;
+        let board = &self.observations.board;
         let shape: &BoardShape = &self.model.board_shape;
         let heights = (0..board.corner_count()).map(|k| {
             let corner = board.corner_in_board(k / board.cols, k % board.cols);
-            (shape.height_mm(&board, &corner), corner)
+            (shape.height_mm(board, &corner), corner)
         });
         let heights: Vec<_> = heights.collect();
         let by_height = |a: &&(f64, _), b: &&(f64, _)| a.0.total_cmp(&b.0);
@@ -100,8 +122,8 @@ impl Estimate {
             return Ok((0.0, 0.0));
         };
         let differences = shape
-            .products(&board, peak)
-            .zip(shape.products(&board, valley))
+            .products(board, peak)
+            .zip(shape.products(board, valley))
             .map(|(a, b)| a - b);
         let variance: f64 = differences
             .zip(layout.board)

@@ -71,6 +71,7 @@ impl PinholeRig {
             rig: Rig {
                 cameras,
                 datum_pose,
+                frame_is_known: false,
                 match_noise_px: None,
                 uncertainty: Vec::new(),
             },

@@ -91,11 +91,7 @@ mod tests {
     use calib_rays::geometry::so3;
 
     const SENSOR: SensorSize = SensorSize::new(1280, 1024);
-    const BOARD: BoardSpec = BoardSpec {
-        rows: 7,
-        cols: 9,
-        square_mm: 12.0,
-    };
+    const BOARD: BoardSpec = BoardSpec::chessboard(7, 9, 12.0);
 
     fn exact() -> (
         Matrix3<f64>,

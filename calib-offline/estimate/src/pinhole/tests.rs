@@ -24,7 +24,11 @@ fn scene(change: impl FnOnce(&mut SceneSettings)) -> Scene {
 
 fn observations(scene: &Scene) -> Observations {
     let sensors = scene.cameras.iter().map(CameraOptics::sensor).collect();
-    Observations::new(scene.settings.board, sensors, &scene.observe_corners())
+    Observations::new(
+        scene.settings.board.clone(),
+        sensors,
+        &scene.observe_corners(),
+    )
 }
 
 /// `fx, fy, cx, cy, k1, k2, p1, p2, k3` of a scene's camera.

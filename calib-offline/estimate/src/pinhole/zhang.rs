@@ -162,11 +162,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     const SENSOR: SensorSize = SensorSize::new(1280, 1024);
-    const BOARD: BoardSpec = BoardSpec {
-        rows: 9,
-        cols: 11,
-        square_mm: 12.0,
-    };
+    const BOARD: BoardSpec = BoardSpec::chessboard(9, 11, 12.0);
 
     fn truth(center: PixelPoint) -> Matrix3<f64> {
         camera_matrix([2050.0, 2030.0], center)

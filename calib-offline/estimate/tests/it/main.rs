@@ -1,4 +1,5 @@
 //! Tests of the crate from outside, in one program.
 
 mod explain;
+mod known_points;
 mod pinhole;

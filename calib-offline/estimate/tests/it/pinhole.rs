@@ -76,17 +76,13 @@ fn rounded(mut views: Vec<View>) -> Vec<View> {
 /// The set that `data/opencv-figures/README.md` gives the command for.
 fn simulated(optics: OpticsKind) -> Observations {
     let mut settings = SceneSettings::standard_noisy(optics, 2022);
-    settings.board = BoardSpec {
-        rows: 7,
-        cols: 6,
-        square_mm: 20.0,
-    };
+    settings.board = BoardSpec::chessboard(7, 6, 20.0);
     settings.angles_deg = (-3..=3).map(|k| f64::from(k) * 12.0).collect();
     settings.spread = 0.3;
     let scene = Scene::new(settings).unwrap();
     let sensors = scene.cameras.iter().map(CameraOptics::sensor).collect();
     Observations::new(
-        scene.settings.board,
+        scene.settings.board.clone(),
         sensors,
         &rounded(scene.observe_corners()),
     )

@@ -59,7 +59,7 @@ impl<'a> Look<'a> {
     /// Looks. Cost: about that of an estimate's start.
     pub fn at(dataset: &'a Dataset, views: &[View]) -> Self {
         let sensors = dataset.cameras.iter().map(|camera| camera.sensor).collect();
-        let observations = Observations::new(dataset.board, sensors, views);
+        let observations = Observations::new(dataset.board.clone(), sensors, views);
         let fields: Vec<Option<RayField>> = (0..dataset.cameras.len())
             .into_par_iter()
             .map(|camera_idx| {
@@ -103,6 +103,18 @@ impl<'a> Look<'a> {
             observations,
             cameras,
             fits,
+        }
+    }
+
+    /// Looks at what was seen alone: no camera gets a start.
+    pub fn unplaced(dataset: &'a Dataset, views: &[View]) -> Self {
+        let sensors = dataset.cameras.iter().map(|camera| camera.sensor).collect();
+        let observations = Observations::new(dataset.board.clone(), sensors, views);
+        Self {
+            dataset,
+            cameras: dataset.cameras.iter().map(|_| None).collect(),
+            fits: vec![None; observations.views.len()],
+            observations,
         }
     }
 

@@ -39,6 +39,12 @@ impl Sheet {
         if views.is_empty() {
             return sheet;
         }
+        // Known places have no other reading of their labels, and a known pose no other place.
+        if !dataset.board.layout.is_grid() || !dataset.known_poses.is_empty() {
+            let look = Look::unplaced(dataset, views);
+            sheet.causes.extend(coverage::coverage(&look));
+            return sheet;
+        }
         let look = Look::at(dataset, views);
         sheet.causes.extend(numbering::from_one(&look));
         let Duplicates {
@@ -194,7 +200,9 @@ impl Sheet {
 fn too_little(dataset: &Dataset, views: &[View]) -> Option<Cause> {
     let error = check_sufficiency(dataset, views).err()?;
     let (code, size) = match &error {
-        SufficiencyError::TooFewPoses { have, .. } => (Code::FewPoses, format!("{have} poses")),
+        SufficiencyError::TooFewPoses { have, .. } | SufficiencyError::Flat { have, .. } => {
+            (Code::FewPoses, format!("{have} poses"))
+        }
         SufficiencyError::SameView { different, .. } => {
             (Code::Duplicates, format!("{different} different places"))
         }

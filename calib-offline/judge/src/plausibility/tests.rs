@@ -6,19 +6,15 @@ use crate::verdict::Grade;
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::{RigidTransform, SensorSize, so3};
 use calib_rays::observed::{Corner, View};
-use calib_recording::dataset::{CameraSpec, Dataset, ExpectedOptics};
+use calib_recording::dataset::{BoardKind, CameraSpec, Dataset, ExpectedOptics};
 use calib_simulate::{OpticsKind, Scene, SceneSettings};
 use nalgebra::Vector3;
 
 /// A recording on a stage: two placements of seven angles.
 fn recording(optics: OpticsKind, seed: u64) -> (Dataset, Vec<View>) {
-    let board = BoardSpec {
-        rows: 8,
-        cols: 10,
-        square_mm: 12.0,
-    };
+    let board = BoardSpec::chessboard(8, 10, 12.0);
     let scene = Scene::new(SceneSettings {
-        board,
+        board: board.clone(),
         placements: 2,
         angles_deg: (-3..=3).map(|k| 12.0 * f64::from(k)).collect(),
         ..SceneSettings::standard_noisy(optics, seed)
@@ -27,6 +23,7 @@ fn recording(optics: OpticsKind, seed: u64) -> (Dataset, Vec<View>) {
     let cameras = scene.cameras.iter().zip(&scene.names);
     let dataset = Dataset {
         folder: ".".into(),
+        kind: BoardKind::Chessboard,
         board,
         cameras: cameras
             .map(|(camera, name)| CameraSpec {
@@ -38,6 +35,7 @@ fn recording(optics: OpticsKind, seed: u64) -> (Dataset, Vec<View>) {
             })
             .collect(),
         stage: None,
+        known_poses: [].into(),
         excluded_poses: [].into(),
         target: None,
         certificate: None,
@@ -51,7 +49,7 @@ fn hand_held(count: usize, tilt_deg: f64, depth_share: f64, across: f64) -> (Dat
     let (mut dataset, _) = brown();
     dataset.board.square_mm = 10.0;
     let mut scene = Scene::new(SceneSettings {
-        board: dataset.board,
+        board: dataset.board.clone(),
         placements: 1,
         angles_deg: vec![0.0; count],
         ..SceneSettings::standard_noisy(OpticsKind::Brown, 7)

@@ -30,6 +30,9 @@ pub struct Rig {
     pub cameras: Vec<CalibratedCamera>,
     /// The pose whose board frame is the rig frame.
     pub datum_pose: usize,
+    /// Whether the rig's frame is that of poses known beforehand, and not the board at the datum pose.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub frame_is_known: bool,
     /// How well pairs of cameras know their rays, the first camera with each other; empty if that
     /// was not estimated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -144,6 +147,15 @@ impl SeenPair<'_> {
 }
 
 impl Rig {
+    /// What the rig's frame is, in words.
+    pub fn frame(&self) -> String {
+        if self.frame_is_known {
+            "frame of the known poses".to_owned()
+        } else {
+            format!("board at pose {}", self.datum_pose)
+        }
+    }
+
     /// Covariance of the point of two sightings, in either order; `None` if the pair has no
     /// uncertainty, for a pixel without a ray, and for parallel rays.
     ///

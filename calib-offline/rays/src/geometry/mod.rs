@@ -7,6 +7,7 @@ pub mod hull;
 pub mod pixel;
 pub mod placement;
 pub mod ray;
+mod scatter;
 pub mod se3;
 pub mod so3;
 pub mod triangulation;
@@ -14,6 +15,7 @@ pub mod triangulation;
 pub use pixel::{PixelPoint, SensorSize};
 pub use placement::best_placement;
 pub use ray::Ray;
+pub use scatter::Scatter;
 pub use se3::RigidTransform;
 pub use triangulation::{
     TriangulateError, Triangulation, midpoint_by_shifts, nearest_point, triangulate_pair,

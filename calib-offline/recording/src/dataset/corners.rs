@@ -1,27 +1,26 @@
 //! `corners.csv`: labelled corners in and out. One row per corner, header
-//! `camera,pose,row,col,u,v` with an optional seventh column `sigma_px`.
+//! `camera,pose,row,col,u,v` with an optional seventh column `sigma_px`; of points with known places
+//! `camera,pose,u,v,x_mm,y_mm,z_mm` with optional `sigma_px` and `sigma_mm`.
 
 pub(super) mod error;
+pub(super) mod fields;
 mod header;
+mod places;
+mod row;
 
 pub use error::CornersError;
 pub use header::{HEADER, HEADER_WITH_SIGMA};
 
-use super::Dataset;
+use super::{BoardKind, Dataset};
 use crate::atomic_file::{self, WriteError};
+use calib_rays::board::BoardSpec;
 use calib_rays::geometry::PixelPoint;
 use calib_rays::observed::{Corner, View};
+use fields::{shortened, unquoted};
+use header::Columns;
+use row::{Label, Row};
 use std::fmt::Write as _;
 use std::path::Path;
-
-/// One line of the file.
-#[derive(Debug, Clone, Copy)]
-struct Row {
-    line: usize,
-    camera_idx: usize,
-    pose: usize,
-    corner: Corner,
-}
 
 /// The corners beside the manifest; `None` if there is no `corners.csv`.
 ///
@@ -45,17 +44,29 @@ pub fn load_corners(dataset: &Dataset) -> Result<Option<Vec<View>>, CornersError
 /// # Errors
 /// [`CornersError`], with the line.
 pub fn read_corners(dataset: &Dataset, path: &Path) -> Result<Vec<View>, CornersError> {
+    parse_corners(dataset, path, &text_of(path)?)
+}
+
+/// The target whose known places stand in the file of corners.
+///
+/// # Errors
+/// [`CornersError`], with the line.
+pub(super) fn read_places(dataset: &Dataset) -> Result<BoardSpec, CornersError> {
+    let path = dataset.corners_path();
+    Ok(places::target(&rows(dataset, &path, &text_of(&path)?)?))
+}
+
+fn text_of(path: &Path) -> Result<String, CornersError> {
     let bytes = std::fs::read(path).map_err(|source| CornersError::Read {
         file: path.to_owned(),
         source,
     })?;
-    let text = String::from_utf8(bytes).map_err(|error| CornersError::NotText {
+    String::from_utf8(bytes).map_err(|error| CornersError::NotText {
         file: path.to_owned(),
         line: error.as_bytes()[..error.utf8_error().valid_up_to()]
             .split(|b| *b == b'\n')
             .count(),
-    })?;
-    parse_corners(dataset, path, &text)
+    })
 }
 
 /// The corners in the text of a file; `file` is for messages only.
@@ -67,33 +78,40 @@ pub fn parse_corners(
     file: &Path,
     text: &str,
 ) -> Result<Vec<View>, CornersError> {
+    let rows = rows(dataset, file, text)?;
+    if dataset.kind != BoardKind::Points {
+        check_on_board(dataset, file, &rows)?;
+    }
+    check_on_sensor(dataset, file, &rows)?;
+    views(dataset, file, rows)
+}
+
+fn rows(dataset: &Dataset, file: &Path, text: &str) -> Result<Vec<Row>, CornersError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut lines = text.lines().enumerate();
     let header = lines.next().map_or("", |(_, line)| line.trim());
     // As in the rows, blanks and quotes around a name mean nothing.
     let names: Vec<&str> = header.split(',').map(unquoted).collect();
-    let columns = match names.join(",").as_str() {
-        HEADER => 6,
-        HEADER_WITH_SIGMA => 7,
-        "" if text.trim().is_empty() => {
-            return Err(CornersError::Empty {
+    let columns = Columns::of(&names.join(","), dataset.kind).ok_or_else(|| {
+        if text.trim().is_empty() {
+            CornersError::Empty {
                 file: file.to_owned(),
                 line: 1,
-            });
-        }
-        _ => {
-            return Err(CornersError::Header {
+            }
+        } else {
+            CornersError::Header {
                 file: file.to_owned(),
                 found: shortened(header),
-            });
+                kind: dataset.kind,
+            }
         }
-    };
+    })?;
     let mut rows = Vec::new();
     let mut last_line = 1;
     for (index, line) in lines {
         last_line = index + 1;
         if !line.trim().is_empty() {
-            rows.push(parse_row(dataset, file, index + 1, line, columns)?);
+            rows.push(row::parse(dataset, file, index + 1, line, columns)?);
         }
     }
     if rows.is_empty() {
@@ -102,125 +120,43 @@ pub fn parse_corners(
             line: last_line,
         });
     }
-    check_on_board(dataset, file, &rows)?;
-    check_on_sensor(dataset, file, &rows)?;
-    views(dataset, file, rows)
-}
-
-fn parse_row(
-    dataset: &Dataset,
-    file: &Path,
-    line: usize,
-    text: &str,
-    columns: usize,
-) -> Result<Row, CornersError> {
-    let mut fields = [""; 7];
-    let mut have = 0;
-    for field in text.split(',') {
-        if let Some(slot) = fields.get_mut(have) {
-            *slot = unquoted(field);
-        }
-        have += 1;
-    }
-    if have != columns {
-        return Err(CornersError::FieldCount {
-            file: file.to_owned(),
-            line,
-            have,
-            need: columns,
-        });
-    }
-    let not_a = |column, text: &str, expected| CornersError::Number {
-        file: file.to_owned(),
-        line,
-        column,
-        text: shortened(text),
-        expected,
-    };
-    let count = |text: &str, column| {
-        text.parse::<usize>()
-            .map_err(|_| not_a(column, text, "whole number from 0"))
-    };
-    let number = |text: &str, column| {
-        text.parse::<f64>()
-            .map_err(|_| not_a(column, text, "number"))
-    };
-    let pixel = |text: &str, column| {
-        let value = number(text, column)?;
-        if value.is_finite() {
-            return Ok(value);
-        }
-        Err(CornersError::NotFinite {
-            file: file.to_owned(),
-            line,
-            column,
-            value,
-        })
-    };
-    let camera_idx = dataset
-        .camera_idx(fields[0])
-        .ok_or_else(|| CornersError::UnknownCamera {
-            file: file.to_owned(),
-            line,
-            camera: shortened(fields[0]),
-            known: dataset.cameras.iter().map(|c| c.name.clone()).collect(),
-        })?;
-    let sigma_px = match fields[6] {
-        "" => None,
-        text => match number(text, "sigma_px")? {
-            value if value.is_finite() && value > 0.0 => Some(value),
-            value => {
-                return Err(CornersError::Sigma {
-                    file: file.to_owned(),
-                    line,
-                    value,
-                });
-            }
-        },
-    };
-    Ok(Row {
-        line,
-        camera_idx,
-        pose: count(fields[1], "pose")?,
-        corner: Corner {
-            row: count(fields[2], "row")?,
-            col: count(fields[3], "col")?,
-            pixel: PixelPoint::new(pixel(fields[4], "u")?, pixel(fields[5], "v")?),
-            sigma_px,
-        },
-    })
+    Ok(rows)
 }
 
 fn check_on_board(dataset: &Dataset, file: &Path, rows: &[Row]) -> Result<(), CornersError> {
     let board = &dataset.board;
-    let off_board = rows
-        .iter()
-        .find(|r| r.corner.row >= board.rows || r.corner.col >= board.cols);
-    let Some(row) = off_board else { return Ok(()) };
+    let labels = || {
+        rows.iter().filter_map(|row| match row.label {
+            Label::RowCol(r, c) => Some((row.line, r, c)),
+            Label::Place(_) => None,
+        })
+    };
+    let off_board = labels().find(|(_, row, col)| *row >= board.rows || *col >= board.cols);
+    let Some((line, row, col)) = off_board else {
+        return Ok(());
+    };
     Err(CornersError::OutOfBoard {
         file: file.to_owned(),
-        line: row.line,
-        row: row.corner.row,
-        col: row.corner.col,
+        line,
+        row,
+        col,
         rows: board.rows,
         cols: board.cols,
-        largest_row: rows.iter().map(|r| r.corner.row).max().unwrap_or(0),
-        largest_col: rows.iter().map(|r| r.corner.col).max().unwrap_or(0),
+        largest_row: labels().map(|(_, row, _)| row).max().unwrap_or(0),
+        largest_col: labels().map(|(_, _, col)| col).max().unwrap_or(0),
     })
 }
 
 fn check_on_sensor(dataset: &Dataset, file: &Path, rows: &[Row]) -> Result<(), CornersError> {
-    let off_sensor = rows.iter().find(|r| {
-        !dataset.cameras[r.camera_idx]
-            .sensor
-            .contains(r.corner.pixel)
-    });
+    let off_sensor = rows
+        .iter()
+        .find(|r| !dataset.cameras[r.camera_idx].sensor.contains(r.pixel));
     let Some(row) = off_sensor else { return Ok(()) };
     let camera = &dataset.cameras[row.camera_idx];
     let pixels = || {
         rows.iter()
             .filter(|r| r.camera_idx == row.camera_idx)
-            .map(|r| r.corner.pixel)
+            .map(|r| r.pixel)
     };
     let fold = |pick: fn(f64, f64) -> f64, start: f64| {
         PixelPoint::new(
@@ -233,36 +169,67 @@ fn check_on_sensor(dataset: &Dataset, file: &Path, rows: &[Row]) -> Result<(), C
         line: row.line,
         camera: camera.name.clone(),
         sensor: camera.sensor,
-        pixel: row.corner.pixel,
+        pixel: row.pixel,
         least: fold(f64::min, f64::INFINITY),
         most: fold(f64::max, f64::NEG_INFINITY),
     })
 }
 
-fn views(dataset: &Dataset, file: &Path, mut rows: Vec<Row>) -> Result<Vec<View>, CornersError> {
-    let place = |r: &Row| (r.pose, r.camera_idx, r.corner.row, r.corner.col);
-    rows.sort_by_key(|r| (place(r), r.line));
-    let twice = rows
+fn views(dataset: &Dataset, file: &Path, rows: Vec<Row>) -> Result<Vec<View>, CornersError> {
+    let labels = places::Labels::of(&places::target(&rows));
+    let mut found = Vec::with_capacity(rows.len());
+    for row in rows {
+        let (r, c) = match row.label {
+            Label::RowCol(r, c) => (r, c),
+            Label::Place(place) => match labels.col(&place.at_mm) {
+                Some(col) if col < dataset.board.cols => (0, col),
+                _ => {
+                    return Err(CornersError::OtherPlace {
+                        file: file.to_owned(),
+                        line: row.line,
+                        at_mm: place.at_mm.into(),
+                    });
+                }
+            },
+        };
+        let corner = Corner {
+            row: r,
+            col: c,
+            pixel: row.pixel,
+            sigma_px: row.sigma_px,
+        };
+        found.push((row.pose, row.camera_idx, corner, row.line));
+    }
+    found.sort_by_key(|(pose, camera_idx, c, line)| (*pose, *camera_idx, c.row, c.col, *line));
+    let place = |(pose, camera_idx, c, _): &(usize, usize, Corner, usize)| {
+        (*pose, *camera_idx, c.row, c.col)
+    };
+    let twice = found
         .windows(2)
         .filter(|pair| place(&pair[0]) == place(&pair[1]))
-        .min_by_key(|pair| pair[1].line);
-    if let Some([first, second]) = twice {
+        .min_by_key(|pair| pair[1].3);
+    if let Some([first, (pose, camera_idx, corner, line)]) = twice {
         return Err(CornersError::Duplicate {
             file: file.to_owned(),
-            line: second.line,
-            first_line: first.line,
-            camera: dataset.cameras[second.camera_idx].name.clone(),
-            pose: second.pose,
-            row: second.corner.row,
-            col: second.corner.col,
+            line: *line,
+            first_line: first.3,
+            camera: dataset.cameras[*camera_idx].name.clone(),
+            pose: *pose,
+            label: match dataset.kind {
+                BoardKind::Points => {
+                    let at = dataset.board.corner_in_board(corner.row, corner.col);
+                    format!("the point ({}, {}, {}) mm", at.x, at.y, at.z)
+                }
+                _ => format!("row {}, col {}", corner.row, corner.col),
+            },
         });
     }
-    Ok(rows
-        .chunk_by(|a, b| (a.pose, a.camera_idx) == (b.pose, b.camera_idx))
+    Ok(found
+        .chunk_by(|a, b| (a.0, a.1) == (b.0, b.1))
         .map(|view| View {
-            camera_idx: view[0].camera_idx,
-            pose: view[0].pose,
-            corners: view.iter().map(|r| r.corner).collect(),
+            camera_idx: view[0].1,
+            pose: view[0].0,
+            corners: view.iter().map(|(_, _, corner, _)| *corner).collect(),
         })
         .collect())
 }
@@ -276,8 +243,8 @@ pub fn write_corners(path: &Path, dataset: &Dataset, views: &[View]) -> Result<(
     atomic_file::write(path, format_corners(dataset, views).as_bytes())
 }
 
-/// The text that [`write_corners`] writes. Views of cameras that the dataset does not have are
-/// left out.
+/// The text that [`write_corners`] writes: corners of a grid, by row and column. Views of cameras
+/// that the dataset does not have are left out.
 pub fn format_corners(dataset: &Dataset, views: &[View]) -> String {
     let corners = || views.iter().flat_map(|view| &view.corners);
     let with_sigma = corners().any(|corner| corner.sigma_px.is_some());
@@ -309,25 +276,6 @@ pub fn format_corners(dataset: &Dataset, views: &[View]) -> String {
         }
     }
     text
-}
-
-/// A field without the blanks around it, and without the quotes that some programs put around
-/// every text.
-fn unquoted(field: &str) -> &str {
-    let field = field.trim();
-    field
-        .strip_prefix('"')
-        .and_then(|rest| rest.strip_suffix('"'))
-        .map_or(field, str::trim)
-}
-
-/// The first characters of something that may be long or unprintable.
-fn shortened(text: &str) -> String {
-    let mut short: String = text.chars().take(60).flat_map(char::escape_debug).collect();
-    if text.chars().nth(60).is_some() {
-        short.push_str("...");
-    }
-    short
 }
 
 #[cfg(test)]

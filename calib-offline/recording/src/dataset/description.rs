@@ -3,9 +3,10 @@
 use super::target::TargetSpec;
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::SensorSize;
+use calib_rays::observed::KnownPose;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 /// A dataset; corners are loaded or detected separately.
@@ -13,12 +14,16 @@ use std::path::PathBuf;
 pub struct Dataset {
     /// The folder that holds `dataset.toml`.
     pub folder: PathBuf,
-    /// The calibration board.
+    /// What the calibration target is.
+    pub kind: BoardKind,
+    /// The calibration target's labels, and where they lie.
     pub board: BoardSpec,
     /// One or more cameras, in the manifest's order.
     pub cameras: Vec<CameraSpec>,
     /// The rotation stage, if the manifest speaks of one. Without it poses are free.
     pub stage: Option<StageSpec>,
+    /// Poses of the target that are known beforehand, by number; empty where the cameras find all of them.
+    pub known_poses: BTreeMap<usize, KnownPose>,
     /// Poses that the user leaves out.
     pub excluded_poses: BTreeSet<usize>,
     /// The measurement target, if the manifest describes one. No calibration depends on it.
@@ -64,6 +69,36 @@ impl Dataset {
             .map(|camera| camera.images.len())
             .max()
             .unwrap_or(0)
+    }
+}
+
+/// What a calibration target is: `[board] kind`. A kind with facts of its own that only a detector needs
+/// carries them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum BoardKind {
+    /// The inner corners of a chessboard.
+    #[default]
+    Chessboard,
+    /// Points with known places, which stand in the file of corners.
+    Points,
+}
+
+impl BoardKind {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Chessboard, Self::Points];
+
+    /// The word in the manifest.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Chessboard => "chessboard",
+            Self::Points => "points",
+        }
+    }
+
+    /// The kind with this word.
+    pub fn from_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.word() == word)
     }
 }
 

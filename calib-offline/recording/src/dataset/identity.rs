@@ -29,6 +29,17 @@ pub fn input_sha256(dataset: &Dataset, views: &[View]) -> String {
     if let Some(stage) = &dataset.stage {
         let _ = writeln!(facts, "stage {:?} {:?}", stage.angles_deg, stage.placement);
     }
+    for (pose, known) in &dataset.known_poses {
+        let _ = writeln!(facts, "known {pose} {known:?}");
+    }
+    for col in 0..dataset.board.cols {
+        if dataset.board.layout.is_grid() {
+            break;
+        }
+        let place = dataset.board.corner_in_board(0, col);
+        let sigma_mm = dataset.board.place_sigma_mm(col);
+        let _ = writeln!(facts, "place {place:?} {sigma_mm}");
+    }
     let _ = writeln!(facts, "exclude {:?}", dataset.excluded_poses);
     let mut hash = Sha256::new();
     hash.update(&facts);
@@ -64,7 +75,7 @@ pub fn hex(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::{CameraSpec, Certificate};
+    use crate::dataset::{BoardKind, CameraSpec, Certificate};
     use calib_rays::board::BoardSpec;
     use calib_rays::geometry::{PixelPoint, SensorSize};
     use calib_rays::observed::Corner;
@@ -73,11 +84,8 @@ mod tests {
     fn every_fact_changes_it_and_the_folder_does_not() {
         let dataset = Dataset {
             folder: "a".into(),
-            board: BoardSpec {
-                rows: 5,
-                cols: 4,
-                square_mm: 10.0,
-            },
+            kind: BoardKind::Chessboard,
+            board: BoardSpec::chessboard(5, 4, 10.0),
             cameras: vec![CameraSpec {
                 name: "left".to_owned(),
                 sensor: SensorSize::new(640, 480),
@@ -86,6 +94,7 @@ mod tests {
                 serial: None,
             }],
             stage: None,
+            known_poses: [].into(),
             excluded_poses: [3].into(),
             target: None,
             certificate: None,

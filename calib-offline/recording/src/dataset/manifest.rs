@@ -1,6 +1,7 @@
 //! `dataset.toml`: reading it strictly. A key that means nothing is an error, and so is a value
 //! that cannot be meant; each names the line.
 
+mod board;
 mod declared;
 mod error;
 mod images;
@@ -17,12 +18,12 @@ pub use limits::{
 };
 pub use target_problem::TargetProblem;
 
-use super::description::{CameraSpec, Certificate, Dataset, StageSpec};
-use calib_rays::board::BoardSpec;
+use super::description::{BoardKind, CameraSpec, Dataset, StageSpec};
+use super::{corners, known_poses};
 use calib_rays::geometry::SensorSize;
-use raw::{RawBoard, RawCamera, RawManifest, RawStage};
+use raw::{RawCamera, RawManifest, RawStage};
 use source::{Source, ranged, read};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
@@ -46,14 +47,20 @@ impl Dataset {
             Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
             _ => PathBuf::from("."),
         };
-        let (board, certificate) = board(&source, raw.board)?;
+        let board::Declared {
+            kind,
+            board,
+            certificate,
+        } = board::declared(&source, raw.board)?;
         let has_corners = folder.join(Self::CORNERS).exists();
         let cameras = cameras(&source, &folder, &raw.camera, has_corners)?;
         let mut dataset = Self {
             folder,
+            kind,
             board,
             cameras,
             stage: None,
+            known_poses: BTreeMap::new(),
             excluded_poses: BTreeSet::new(),
             target: None,
             certificate,
@@ -63,6 +70,22 @@ impl Dataset {
                 .transpose()?,
         };
         dataset.target = target::target(&source, &dataset, raw.target, &raw.camera)?;
+        if let Some(known) = raw.poses.and_then(|poses| poses.known) {
+            dataset.known_poses = known_poses::read(&dataset.folder.join(known))
+                .map_err(|source| ManifestError::KnownPoses { source })?;
+        }
+        if dataset.kind == BoardKind::Points && !has_corners {
+            return Err(ManifestError::NoPlaces { file: source.file });
+        }
+        if dataset.kind == BoardKind::Points {
+            let places = corners::read_places(&dataset)
+                .map_err(|source| ManifestError::Places { source })?;
+            let expansion_ppm = dataset.certificate.and_then(|c| c.expansion_ppm());
+            dataset.board = match expansion_ppm {
+                Some(ppm) => places.scaled(1.0 + 1e-6 * ppm),
+                None => places,
+            };
+        }
         let pose_count = (!has_corners).then(|| dataset.image_pose_count());
         if let Some(raw) = raw.stage {
             dataset.stage = Some(stage(&source, raw, pose_count)?);
@@ -82,78 +105,6 @@ impl Dataset {
         }
         Ok(dataset)
     }
-}
-
-fn board(
-    source: &Source,
-    raw: Option<Spanned<RawBoard>>,
-) -> Result<(BoardSpec, Option<Certificate>), ManifestError> {
-    let file = source.file.clone();
-    let raw = raw.ok_or_else(|| ManifestError::Missing {
-        file: file.clone(),
-        line: 1,
-        key: "[board]",
-    })?;
-    let line = source.line_of(&raw);
-    let raw = raw.into_inner();
-    if let Some(kind) = raw.kind
-        && kind.get_ref() != "chessboard"
-    {
-        return Err(ManifestError::BoardKind {
-            file,
-            line: source.line_of(&kind),
-            kind: kind.into_inner(),
-        });
-    }
-    let count = |value: Option<Spanned<i64>>, key| {
-        ranged(
-            source,
-            line,
-            value,
-            key,
-            MIN_CORNERS_PER_SIDE,
-            MAX_CORNERS_PER_SIDE,
-        )
-    };
-    let rows = count(raw.rows, "[board] rows")?;
-    let cols = count(raw.cols, "[board] cols")?;
-    let Some(square_mm) = raw.square_mm else {
-        return Err(ManifestError::SquareSizeMissing { file, line });
-    };
-    let value = *square_mm.get_ref();
-    let problem = if value.is_nan() {
-        "not a number"
-    } else if value.is_infinite() {
-        "infinite"
-    } else if value == 0.0 {
-        "zero"
-    } else if value < 0.0 {
-        "negative"
-    } else if value < MIN_SQUARE_MM {
-        "less than a micrometer (the unit is mm)"
-    } else if value > MAX_SQUARE_MM {
-        "more than ten meters (the unit is mm)"
-    } else {
-        let certificate = raw.certificate;
-        let certificate = certificate.map(|raw| declared::certificate(source, raw));
-        let certificate = certificate.transpose()?;
-        let expansion_ppm = certificate.and_then(|c| c.expansion_ppm());
-        let board = BoardSpec {
-            rows: rows as usize,
-            cols: cols as usize,
-            // As it was while it was recorded, to a picometer: longer numbers only look exact.
-            square_mm: expansion_ppm.map_or(value, |ppm| {
-                (value * (1.0 + 1e-6 * ppm) * 1e9).round() / 1e9
-            }),
-        };
-        return Ok((board, certificate));
-    };
-    Err(ManifestError::SquareSize {
-        file,
-        line: source.line_of(&square_mm),
-        value,
-        problem,
-    })
 }
 
 fn cameras(

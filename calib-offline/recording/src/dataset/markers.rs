@@ -19,11 +19,7 @@ pub fn load_markers(dataset: &Dataset) -> Result<Option<Vec<View>>, CornersError
         Some(target) if path.exists() => {
             // The reader checks labels against a board: this one has the target's rows and columns.
             let labels = Dataset {
-                board: BoardSpec {
-                    rows: target.rows,
-                    cols: target.cols,
-                    square_mm: target.pitch_mm,
-                },
+                board: BoardSpec::chessboard(target.rows, target.cols, target.pitch_mm),
                 ..dataset.clone()
             };
             read_corners(&labels, &path).map(Some)
@@ -35,7 +31,7 @@ pub fn load_markers(dataset: &Dataset) -> Result<Option<Vec<View>>, CornersError
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::{CameraSpec, TargetSpec};
+    use crate::dataset::{BoardKind, CameraSpec, TargetSpec};
     use calib_rays::geometry::SensorSize;
 
     #[test]
@@ -43,11 +39,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut dataset = Dataset {
             folder: folder.path().to_owned(),
-            board: BoardSpec {
-                rows: 3,
-                cols: 3,
-                square_mm: 10.0,
-            },
+            kind: BoardKind::Chessboard,
+            board: BoardSpec::chessboard(3, 3, 10.0),
             cameras: vec![CameraSpec {
                 name: "left".to_owned(),
                 sensor: SensorSize::new(640, 480),
@@ -56,6 +49,7 @@ mod tests {
                 serial: None,
             }],
             stage: None,
+            known_poses: [].into(),
             excluded_poses: std::collections::BTreeSet::new(),
             target: Some(TargetSpec {
                 rows: 7,

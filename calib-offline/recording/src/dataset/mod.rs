@@ -5,6 +5,7 @@ mod description;
 pub mod identity;
 pub mod image;
 pub mod image_files;
+pub mod known_poses;
 pub mod manifest;
 mod markers;
 pub mod split;
@@ -13,7 +14,9 @@ pub mod sufficiency;
 pub mod target;
 
 pub use corners::{CornersError, load_corners, write_corners};
-pub use description::{CameraSpec, Certificate, Dataset, ExpectedOptics, RecordingSpec, StageSpec};
+pub use description::{
+    BoardKind, CameraSpec, Certificate, Dataset, ExpectedOptics, RecordingSpec, StageSpec,
+};
 pub use identity::input_sha256;
 pub use manifest::ManifestError;
 pub use markers::load_markers;

@@ -1,8 +1,11 @@
 //! Whether the corners could determine a calibration at all: cheap counts before any estimate.
 
 use super::Dataset;
+use calib_rays::board::BoardSpec;
+use calib_rays::geometry::Scatter;
 use calib_rays::observed::{Corner, MIN_POSES, View, poses};
 use calib_rays::remedy::Remedy;
+use nalgebra::Vector3;
 
 /// Corners of a view lie on a line if their scatter across it is below this share of the scatter
 /// along it. A board seen at 89 degrees still has a share of 1e-2.
@@ -29,6 +32,16 @@ pub enum SufficiencyError {
         /// Poses seen without.
         unusable: usize,
         /// How many it takes.
+        need: usize,
+    },
+    /// Points in one plane, seen in too few poses.
+    #[error("camera \"{camera}\" saw points that lie in one plane, in {have} {}; its focal length cannot be told from its distance", if *have == 1 { "pose" } else { "poses" })]
+    Flat {
+        /// The camera.
+        camera: String,
+        /// Poses seen.
+        have: usize,
+        /// How many it takes of a flat target.
         need: usize,
     },
     /// The board did not move.
@@ -72,6 +85,11 @@ impl Remedy for SufficiencyError {
             Self::TooFewPoses { .. } => {
                 "record at least ten poses at different tilts and distances, with the board over the whole image"
             }
+            Self::Flat { need, .. } => {
+                return Some(format!(
+                    "add points off that plane, or at least {need} poses of it at different tilts, or say with [poses] known how it was moved"
+                ));
+            }
             Self::SameView { .. } => {
                 "move and tilt the board between the images; the same image again says nothing new"
             }
@@ -103,12 +121,23 @@ pub fn check_sufficiency(dataset: &Dataset, views: &[View]) -> Result<(), Suffic
             .collect();
         let (good, lines): (Vec<View>, Vec<View>) = of_camera
             .into_iter()
-            .partition(|view| spreads_over_plane(&view.corners));
+            .partition(|view| spreads_over_plane(&dataset.board, &view.corners));
         let have = poses(&good).len();
         if have == 0 && !lines.is_empty() {
             return Err(SufficiencyError::OnALine {
                 camera: camera.name.clone(),
                 views: lines.len(),
+            });
+        }
+        if is_solid(dataset, &good) {
+            usable[camera_idx] = good;
+            continue;
+        }
+        if have < MIN_POSES && !dataset.board.layout.is_grid() {
+            return Err(SufficiencyError::Flat {
+                camera: camera.name.clone(),
+                have,
+                need: MIN_POSES,
             });
         }
         if have < MIN_POSES {
@@ -135,12 +164,38 @@ pub fn check_sufficiency(dataset: &Dataset, views: &[View]) -> Result<(), Suffic
 
 /// Whether the corners of one view fix its homography: four corners that spread over the board
 /// and over the image.
-pub fn spreads_over_plane(corners: &[Corner]) -> bool {
-    let on_board = corners.iter().map(|c| (c.col as f64, c.row as f64));
+pub fn spreads_over_plane(board: &BoardSpec, corners: &[Corner]) -> bool {
     let in_image = corners.iter().map(|c| (c.pixel.u, c.pixel.v));
-    corners.len() >= 4
-        && scatter_share(on_board) > MIN_SCATTER_SHARE
-        && scatter_share(in_image) > MIN_SCATTER_SHARE
+    let on_board = if board.layout.is_grid() {
+        let labels = corners.iter().map(|c| (c.col as f64, c.row as f64));
+        scatter_share(labels) > MIN_SCATTER_SHARE
+    } else {
+        let places: Vec<_> = places(board, corners).collect();
+        !Scatter::of(&places).is_line()
+    };
+    corners.len() >= 4 && on_board && scatter_share(in_image) > MIN_SCATTER_SHARE
+}
+
+fn places<'a>(
+    board: &'a BoardSpec,
+    corners: &'a [Corner],
+) -> impl Iterator<Item = Vector3<f64>> + 'a {
+    corners.iter().map(|c| board.corner_in_board(c.row, c.col))
+}
+
+/// Whether one rigid target shows a camera points that lie in no plane: in one view, or in several whose poses
+/// are known. Then a single pose determines the camera.
+fn is_solid(dataset: &Dataset, views: &[View]) -> bool {
+    let mut known = Vec::new();
+    for view in views {
+        let places = places(&dataset.board, &view.corners);
+        match dataset.known_poses.get(&view.pose) {
+            Some(pose) => known.extend(places.map(|place| pose.rig_from_board.point(&place))),
+            None if Scatter::of(&places.collect::<Vec<_>>()).is_solid() => return true,
+            None => {}
+        }
+    }
+    Scatter::of(&known).is_solid()
 }
 
 /// How many of one camera's views differ from each other; counted up to [`MIN_POSES`].
@@ -202,9 +257,11 @@ fn check_connected(dataset: &Dataset, usable: &[Vec<View>]) -> Result<(), Suffic
         if std::mem::replace(&mut reached[camera_idx], true) {
             continue;
         }
-        open.extend(
-            (0..poses.len()).filter(|k| !reached[*k] && !poses[*k].is_disjoint(&poses[camera_idx])),
-        );
+        let sees_known = |k: usize| poses[k].iter().any(|p| dataset.known_poses.contains_key(p));
+        open.extend((0..poses.len()).filter(|k| {
+            let shared = !poses[*k].is_disjoint(&poses[camera_idx]);
+            !reached[*k] && (shared || (sees_known(*k) && sees_known(camera_idx)))
+        }));
     }
     match reached.iter().position(|r| !r) {
         None => Ok(()),

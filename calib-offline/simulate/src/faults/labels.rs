@@ -56,7 +56,7 @@ fn relabel(
     is_one: impl Fn(&View) -> bool,
     label: impl Fn(usize, usize) -> (usize, usize),
 ) {
-    let board = written.board;
+    let board = written.board.clone();
     for view in written.views.iter_mut().filter(|view| is_one(view)) {
         for corner in &mut view.corners {
             (corner.row, corner.col) = label(corner.row, corner.col);
@@ -70,7 +70,7 @@ fn relabel(
 /// Numbers some views of the right camera from the opposite end.
 fn half_turn_some(written: &mut Recording, rng: &mut ChaCha8Rng) {
     let some = some_poses(written.pose_count(), rng);
-    let board = written.board;
+    let board = written.board.clone();
     relabel(
         written,
         |view| view.camera_idx == 1 && some.contains(&view.pose),

@@ -55,7 +55,7 @@ impl Recording {
     pub fn of(session: &Session, usual: &Scene, has_dial: bool) -> Self {
         let scene = &session.scene;
         Self {
-            board: scene.settings.board,
+            board: scene.settings.board.clone(),
             names: scene.names.clone(),
             sensors: scene.cameras.iter().map(CameraOptics::sensor).collect(),
             dial: has_dial.then(|| Dial {

@@ -33,21 +33,9 @@ const WIDE: Layout = Layout {
 
 /// Boards, one a draw in turn.
 const BOARDS: [BoardSpec; 3] = [
-    BoardSpec {
-        rows: 8,
-        cols: 10,
-        square_mm: 23.0,
-    },
-    BoardSpec {
-        rows: 9,
-        cols: 12,
-        square_mm: 18.0,
-    },
-    BoardSpec {
-        rows: 7,
-        cols: 6,
-        square_mm: 30.0,
-    },
+    BoardSpec::chessboard(8, 10, 23.0),
+    BoardSpec::chessboard(9, 12, 18.0),
+    BoardSpec::chessboard(7, 6, 30.0),
 ];
 
 /// Which cameras.
@@ -167,7 +155,7 @@ pub fn scene(rig: Rig, poses: Poses, motion: &Motion, seed: u64) -> Result<Scene
     let spread = [preset.spread_shift_mm, preset.spread_look_deg];
     let mut scene = Scene::of_rig(
         SceneSettings {
-            board: BOARDS[(seed.max(1) - 1) as usize % BOARDS.len()],
+            board: BOARDS[(seed.max(1) - 1) as usize % BOARDS.len()].clone(),
             placements: count,
             angles_deg,
             ..SceneSettings::standard_noisy(OpticsKind::Brown, seed)

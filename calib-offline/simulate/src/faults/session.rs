@@ -101,13 +101,13 @@ impl Session {
 
     /// What a corner finder reports: views in the order camera, pose.
     pub fn views(&self) -> Vec<View> {
-        let board = self.scene.settings.board;
+        let board = &self.scene.settings.board;
         let mut views = Vec::new();
         for (camera_idx, takes) in self.takes.iter().enumerate() {
             for (pose, take) in takes.iter().enumerate() {
                 let corners = self
                     .scene
-                    .observe_view(camera_idx, pose, |row, col| take.corner(&board, row, col));
+                    .observe_view(camera_idx, pose, |row, col| take.corner(board, row, col));
                 if !corners.is_empty() {
                     views.push(View {
                         camera_idx,

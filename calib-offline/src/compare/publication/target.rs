@@ -133,11 +133,7 @@ fn experiment(
         .collect();
     let measured = measure_all(runs, &sightings);
     // A target is a board of markers.
-    let board = BoardSpec {
-        rows: target.rows,
-        cols: target.cols,
-        square_mm: target.pitch_mm,
-    };
+    let board = BoardSpec::chessboard(target.rows, target.cols, target.pitch_mm);
     let mut methods = Vec::new();
     let (mut cloud_method, mut cloud) = (None, Vec::new());
     for (method, solution, points) in &measured.methods {

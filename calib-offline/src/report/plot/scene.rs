@@ -88,27 +88,26 @@ fn draw_one(calibration: &Calibration, title: &str, projection: &Matrix2x3<f64>)
         title: title.to_owned(),
         svg: svg.finish(&format!("Cameras and boards: {title}")),
         caption: format!(
-            "{} boards (outline of the inner corners; pose {} stands out: it is the rig frame), {} cameras with what they see to a quarter of the way.{axes}",
+            "{} boards (outline of the inner corners; pose {} stands out{}), {} cameras with what they see to a quarter of the way.{axes}",
             calibration.poses.len(),
             calibration.rig.datum_pose,
+            if calibration.rig.frame_is_known {
+                ""
+            } else {
+                ": it is the rig frame"
+            },
             calibration.rig.cameras.len()
         ),
     }
 }
 
 fn shapes(calibration: &Calibration) -> Vec<Shape> {
-    let (width_mm, height_mm) = calibration.board.extent_mm();
-    let outline = [
-        (0.0, 0.0),
-        (width_mm, 0.0),
-        (width_mm, height_mm),
-        (0.0, height_mm),
-    ];
+    let outline = calibration.board.outline_in_board();
     let board = |rig_from_board: &RigidTransform, class: &str| Shape {
         class: class.to_owned(),
         points: outline
             .iter()
-            .map(|(x, y)| rig_from_board.point(&Vector3::new(*x, *y, 0.0)))
+            .map(|corner| rig_from_board.point(corner))
             .collect(),
         label: None,
     };
@@ -130,6 +129,7 @@ fn shapes(calibration: &Calibration) -> Vec<Shape> {
         .sum::<Vector3<f64>>()
         / calibration.poses.len().max(1) as f64;
     // Drawn beside the boards, a little longer than one is tall.
+    let (width_mm, height_mm) = calibration.board.extent_mm();
     let half_mm = 0.7 * width_mm.max(height_mm);
     shapes.extend(calibration.stage_axes.iter().map(|axis| {
         let beside = axis.point_mm + axis.direction * (middle - axis.point_mm).dot(&axis.direction);

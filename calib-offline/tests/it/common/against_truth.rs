@@ -36,11 +36,7 @@ pub fn hand_held(poses: usize, seed: u64) -> Scene {
         settings.placements = 1;
         settings.angles_deg = vec![0.0; poses];
         settings.seed = seed;
-        settings.board = BoardSpec {
-            rows: 7,
-            cols: 10,
-            square_mm: 14.0,
-        };
+        settings.board = BoardSpec::chessboard(7, 10, 14.0);
     });
     let middle_in_board = scene.settings.board.center_in_board();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -62,7 +58,7 @@ pub fn hand_held(poses: usize, seed: u64) -> Scene {
 /// The corners of a scene, arranged.
 pub fn observations(scene: &Scene, views: &[View]) -> Observations {
     let sensors = scene.cameras.iter().map(CameraOptics::sensor).collect();
-    Observations::new(scene.settings.board, sensors, views)
+    Observations::new(scene.settings.board.clone(), sensors, views)
 }
 
 /// The whole way from corners to the screened estimate.

@@ -2,7 +2,7 @@
 
 use super::against_truth::run_views;
 use calib_estimate::joint::Estimate;
-use calib_judge::half_data::{HalfData, HalfDataCheck, splits};
+use calib_judge::half_data::{HalfData, HalfDataCheck, first_halves};
 use calib_judge::{CrossChecks, cross_check};
 use calib_rays::observed::View;
 use calib_simulate::{OpticsKind, Scene, SceneSettings};
@@ -13,11 +13,11 @@ pub fn names() -> [String; 2] {
 
 /// All checks of an estimate of some of a scene's cameras.
 pub fn checked(scene: &Scene, estimate: &Estimate) -> CrossChecks {
-    let splits = splits(estimate.observations.poses.iter().copied(), |pose| {
+    let halves = first_halves(&estimate.observations, |pose| {
         scene.pose_placements.get(pose).copied()
     });
     let names = &names()[..scene.cameras.len()];
-    cross_check(estimate, &estimate.rig(names), &splits)
+    cross_check(estimate, &estimate.rig(names), &halves)
 }
 
 /// The halves of what the cameras record.

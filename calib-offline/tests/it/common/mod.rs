@@ -23,11 +23,7 @@ pub mod json_schema;
 pub mod snapshot;
 pub mod standard;
 
-pub const BOARD: BoardSpec = BoardSpec {
-    rows: 6,
-    cols: 5,
-    square_mm: 20.0,
-};
+pub const BOARD: BoardSpec = BoardSpec::chessboard(6, 5, 20.0);
 pub const SENSOR: SensorSize = SensorSize::new(640, 480);
 const FOCAL_PX: f64 = 600.0;
 
@@ -142,6 +138,7 @@ pub fn rig() -> Rig {
         uncertainty: Vec::new(),
         cameras: cameras.into(),
         datum_pose: 0,
+        frame_is_known: false,
         match_noise_px: None,
     }
 }
@@ -192,6 +189,7 @@ pub fn calibration() -> Calibration {
         method: "joint".to_owned(),
         input_sha256: "0".repeat(64),
         board: BOARD,
+        known_poses: [].into(),
         board_shape: BoardShape::default(),
         rig: rig(),
         poses: Vec::new(),

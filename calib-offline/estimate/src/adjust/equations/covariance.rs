@@ -10,7 +10,7 @@ use calib_rays::geometry::{PixelPoint, RigidTransform};
 use calib_rays::numerics::cholesky::gram;
 use nalgebra::{DMatrix, DVector, Matrix2x3, Vector3, Vector6};
 
-/// A point fixed in the board frame of one pose, seen at a pixel of one camera. Its predictions
+/// A point fixed in the board frame of one pose, or in the rig's frame where poses are known, seen at a pixel of one camera. Its predictions
 /// are the two components of observed minus predicted pixel.
 #[derive(Debug, Clone, Copy)]
 pub struct Sighting {
@@ -18,7 +18,7 @@ pub struct Sighting {
     pub camera_idx: usize,
     /// Where it is seen.
     pub pixel: PixelPoint,
-    /// In the board frame of the pose (not necessarily on the board), mm.
+    /// In that frame (not necessarily on the board), mm.
     pub point_in_board: Vector3<f64>,
 }
 
@@ -33,14 +33,14 @@ struct Forms {
 
 /// Joint covariance of the predictions of sightings, px^2: rows and columns `2 k + component`.
 ///
-/// All points are fixed in the frame of pose `pose_idx`. `by_point` (px/mm, board frame, 2 rows per
+/// All points are fixed in the frame of pose `pose_idx`, or in the rig's if there is none. `by_point` (px/mm, board frame, 2 rows per
 /// sighting) says what moving the points does. `None` if a point lies behind its camera.
 pub fn sighting_covariance(
     model: &Model,
     layout: &Layout,
     equations: &NormalEquations,
     reduced: &SchurComplement,
-    pose_idx: usize,
+    pose_idx: Option<usize>,
     sightings: &[Sighting],
 ) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
     let maps: Vec<DMatrix<f64>> = model.cameras.iter().map(parameters_to_columns).collect();
@@ -67,19 +67,22 @@ pub fn sighting_covariance(
     }
     match &reduced.eliminated {
         Eliminated::Poses(factors) => {
-            let factor = factors.get(pose_idx)?;
-            let mut own = DMatrix::zeros(6, count);
-            for (k, form) in forms.iter().enumerate() {
-                for component in 0..2 {
-                    own.set_column(2 * k + component, &form.pose[component]);
+            if let Some(pose_idx) = pose_idx {
+                let factor = factors.get(pose_idx)?;
+                let mut own = DMatrix::zeros(6, count);
+                for (k, form) in forms.iter().enumerate() {
+                    for component in 0..2 {
+                        own.set_column(2 * k + component, &form.pose[component]);
+                    }
                 }
+                border -= &equations.arrow.poses[pose_idx].cross * factor.solve(&own);
+                factor.l_dirty().solve_lower_triangular_mut(&mut own);
+                covariance += own.transpose() * &own;
             }
-            border -= &equations.arrow.poses[pose_idx].cross * factor.solve(&own);
-            factor.l_dirty().solve_lower_triangular_mut(&mut own);
-            covariance += own.transpose() * &own;
         }
         Eliminated::Splines(splines) => {
             for (k, form) in forms.iter().enumerate() {
+                let Some(pose_idx) = pose_idx else { break };
                 for component in 0..2 {
                     border
                         .view_mut(
@@ -147,11 +150,14 @@ fn forms(
     model: &Model,
     layout: &Layout,
     maps: &[DMatrix<f64>],
-    pose_idx: usize,
+    pose_idx: Option<usize>,
     sighting: &Sighting,
 ) -> Option<Forms> {
     let camera = &model.cameras[sighting.camera_idx];
-    let pose = model.rig_from_board.get(pose_idx)?;
+    let pose = match pose_idx {
+        Some(pose_idx) => *model.rig_from_board.get(pose_idx)?,
+        None => RigidTransform::identity(),
+    };
     let turned_in_board = pose.rotation * sighting.point_in_board;
     let turned_in_rig = camera.camera_from_rig.rotation * (turned_in_board + pose.translation_mm);
     let point_in_camera = turned_in_rig + camera.camera_from_rig.translation_mm;

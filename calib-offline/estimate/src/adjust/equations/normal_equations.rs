@@ -15,11 +15,11 @@ use super::spline_block::{BorderColumns, EliminatedSpline, SplineBlock};
 use crate::adjust::model::{CameraModel, Layout, Model, Step};
 use crate::adjust::objective::Weights;
 use crate::adjust::observations::{Observations, ViewBasis};
-use crate::adjust::priors::Priors;
+use crate::adjust::priors::{Priors, known_poses};
 use calib_rays::field::structured::StructuredBasis;
 use calib_rays::numerics::arrowhead::{Arrowhead, PosesEliminated, damped, damped_own};
 use calib_rays::numerics::cholesky::BandedCholesky;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix6};
 use rayon::prelude::*;
 
 /// The equations `H step = -gradient` of one linearization, priors included.
@@ -191,6 +191,11 @@ impl NormalEquations {
             if let (Some(block), Some(energy)) = (spline, &priors.thin_plate) {
                 block.add_prior(priors.spline, energy, &camera.spline_amounts());
             }
+        }
+        for (pose_idx, known) in known_poses(model) {
+            let pose = &mut self.arrow.poses[pose_idx];
+            pose.own += Matrix6::from_diagonal(&known.weight);
+            pose.gradient += known.weight.component_mul(&known.change);
         }
         for (row, term) in layout.board.clone().zip(&model.board_shape.terms) {
             self.arrow.shared[(row, row)] += priors.board;

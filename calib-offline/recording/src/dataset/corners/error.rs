@@ -1,7 +1,10 @@
 //! What can be wrong with `corners.csv`, where, and what to do about it.
 
-use super::header::{HEADER, HEADER_WITH_SIGMA};
-use crate::dataset::Dataset;
+use super::header::{
+    Columns, HEADER, HEADER_WITH_SIGMA, POINTS_HEADER, POINTS_HEADER_WITH_SIGMA,
+    POINTS_HEADER_WITH_SIGMAS,
+};
+use crate::dataset::{BoardKind, Dataset};
 use calib_rays::geometry::{PixelPoint, SensorSize};
 use calib_rays::remedy::Remedy;
 use std::path::PathBuf;
@@ -35,12 +38,14 @@ pub enum CornersError {
         line: usize,
     },
     /// The first line is not the header.
-    #[error("{}:1: the header is \"{found}\", it must be \"{HEADER}\" or \"{HEADER_WITH_SIGMA}\"", file.display())]
+    #[error("{}:1: the header is \"{found}\", it must be {}", file.display(), headers(*kind))]
     Header {
         /// The file.
         file: PathBuf,
         /// What stands there, shortened.
         found: String,
+        /// What the target is.
+        kind: BoardKind,
     },
     /// Too few or too many fields.
     #[error("{}:{line}: has {have} fields, the header has {need}", file.display())]
@@ -101,13 +106,13 @@ pub enum CornersError {
         largest_col: usize,
     },
     /// A pixel that is not a number or infinite.
-    #[error("{}:{line}: {column} is {value}; a pixel must be a finite number", file.display())]
+    #[error("{}:{line}: {column} is {value}; a {} must be a finite number", file.display(), if column.ends_with("_mm") { "place" } else { "pixel" })]
     NotFinite {
         /// The file.
         file: PathBuf,
         /// From 1.
         line: usize,
-        /// `u` or `v`.
+        /// `u`, `v`, or a coordinate.
         column: &'static str,
         /// The value.
         value: f64,
@@ -131,17 +136,19 @@ pub enum CornersError {
         most: PixelPoint,
     },
     /// A noise that is none.
-    #[error("{}:{line}: sigma_px is {value}; it must be above 0, or empty if it is not known", file.display())]
+    #[error("{}:{line}: {column} is {value}; it must be above 0, or empty if it is not known", file.display())]
     Sigma {
         /// The file.
         file: PathBuf,
         /// From 1.
         line: usize,
+        /// The column.
+        column: &'static str,
         /// The value.
         value: f64,
     },
     /// One corner twice in one view.
-    #[error("{}:{line}: camera \"{camera}\", pose {pose}, row {row}, col {col} stands already in line {first_line}", file.display())]
+    #[error("{}:{line}: camera \"{camera}\", pose {pose}, {label} stands already in line {first_line}", file.display())]
     Duplicate {
         /// The file.
         file: PathBuf,
@@ -153,10 +160,18 @@ pub enum CornersError {
         camera: String,
         /// The pose.
         pose: usize,
-        /// The row.
-        row: usize,
-        /// The column.
-        col: usize,
+        /// What the corner is called there.
+        label: String,
+    },
+    /// A place that the target does not have.
+    #[error("{}:{line}: the point ({}, {}, {}) mm is none of the target's", file.display(), at_mm[0], at_mm[1], at_mm[2])]
+    OtherPlace {
+        /// The file.
+        file: PathBuf,
+        /// From 1.
+        line: usize,
+        /// The place, mm.
+        at_mm: [f64; 3],
     },
     /// A stage list whose length does not fit the poses.
     #[error("{}: [stage] {key} has {have} entries, and {} has {poses} poses numbered {first} to {last}", file.display(), Dataset::CORNERS)]
@@ -176,6 +191,16 @@ pub enum CornersError {
     },
 }
 
+/// The headers that a target's file may have, in words.
+fn headers(kind: BoardKind) -> String {
+    match kind {
+        BoardKind::Points => format!(
+            "\"{POINTS_HEADER}\", \"{POINTS_HEADER_WITH_SIGMA}\" or \"{POINTS_HEADER_WITH_SIGMAS}\""
+        ),
+        _ => format!("\"{HEADER}\" or \"{HEADER_WITH_SIGMA}\""),
+    }
+}
+
 impl Remedy for CornersError {
     fn remedy(&self) -> Option<String> {
         let text = match self {
@@ -189,6 +214,20 @@ impl Remedy for CornersError {
             }
             Self::Header { found, .. } if found.contains([';', '\t']) => {
                 "save the file with commas between the fields".to_owned()
+            }
+            Self::Header { found, kind, .. }
+                if BoardKind::ALL.iter().any(|other| {
+                    other != kind && Columns::of(&found.replace(' ', ""), *other).is_some()
+                }) =>
+            {
+                let other = match kind {
+                    BoardKind::Points => BoardKind::Chessboard,
+                    _ => BoardKind::Points,
+                };
+                format!(
+                    "the columns are those of [board] kind = \"{}\"",
+                    other.word()
+                )
             }
             Self::Header { .. } => "the first line names the columns, in this order".to_owned(),
             Self::FieldCount { .. } => {
@@ -235,6 +274,9 @@ impl Remedy for CornersError {
                 }
             }
             Self::Sigma { .. } => "correct or empty the field".to_owned(),
+            Self::OtherPlace { .. } => {
+                "write the same coordinates in every line of one point".to_owned()
+            }
             Self::Duplicate { .. } => "keep the better of the two lines".to_owned(),
             Self::StageLength { .. } => {
                 "give one entry per pose, in the order of the pose numbers, or leave the key out"

@@ -1,5 +1,5 @@
 use super::*;
-use crate::dataset::{CameraSpec, StageSpec};
+use crate::dataset::{BoardKind, CameraSpec, StageSpec};
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::SensorSize;
 use calib_rays::observed::poses;
@@ -9,11 +9,8 @@ use std::collections::BTreeSet;
 fn dataset() -> Dataset {
     Dataset {
         folder: "set".into(),
-        board: BoardSpec {
-            rows: 15,
-            cols: 13,
-            square_mm: 10.0,
-        },
+        kind: BoardKind::Chessboard,
+        board: BoardSpec::chessboard(15, 13, 10.0),
         cameras: ["left", "right"]
             .map(|name| CameraSpec {
                 name: name.to_owned(),
@@ -24,6 +21,7 @@ fn dataset() -> Dataset {
             })
             .into(),
         stage: None,
+        known_poses: [].into(),
         excluded_poses: BTreeSet::new(),
         target: None,
         certificate: None,

@@ -2,7 +2,8 @@
 
 use super::limits::MAX_CAMERAS;
 use super::target_problem::TargetProblem;
-use crate::dataset::Dataset;
+use crate::dataset::known_poses::KnownPosesError;
+use crate::dataset::{BoardKind, CornersError, Dataset};
 use calib_rays::remedy::Remedy;
 use std::path::PathBuf;
 
@@ -97,6 +98,18 @@ pub enum ManifestError {
         line: usize,
         /// The kind.
         kind: String,
+    },
+    /// A key that this kind of target does not take.
+    #[error("{}:{line}: [board] {key} means nothing with kind = \"{kind}\"", file.display())]
+    BoardKey {
+        /// The manifest.
+        file: PathBuf,
+        /// From 1.
+        line: usize,
+        /// The key.
+        key: &'static str,
+        /// The kind.
+        kind: &'static str,
     },
     /// A name that could not stand in a CSV header.
     #[error("{}:{line}: [[camera]] name = {name:?} cannot be used", file.display())]
@@ -314,6 +327,24 @@ pub enum ManifestError {
         /// What stands there.
         text: String,
     },
+    /// Points, and no file of them: nothing in an image says where they are.
+    #[error("{}: [board] kind = \"points\" needs {} beside it, and there is none", file.display(), Dataset::CORNERS)]
+    NoPlaces {
+        /// The manifest.
+        file: PathBuf,
+    },
+    /// The places of the points, which stand in the file of corners.
+    #[error("{source}")]
+    Places {
+        /// What is wrong with that file.
+        source: CornersError,
+    },
+    /// The poses that are known beforehand.
+    #[error("{source}")]
+    KnownPoses {
+        /// What is wrong with their file.
+        source: KnownPosesError,
+    },
     /// The measurement target.
     #[error("{}:{line}: {problem}", file.display())]
     Target {
@@ -335,7 +366,7 @@ impl Remedy for ManifestError {
             Self::Read { .. } | Self::ImageFolder { .. } => "check the path and the permissions",
             Self::NotText { .. } => "save the manifest as UTF-8 text",
             Self::Syntax { .. } => {
-                "correct the line; the keys are [dataset] exclude; [board] kind, rows, cols, square_mm; [board.certificate] scale_ppm_sd, flatness_mm_sd, expansion_ppm_per_k, expansion_ppm_per_k_sd, calibrated_at_c, used_at_c, used_at_c_sd; [[camera]] name, width, height, images or image_list, target_images, optics, serial; [recording] name, by, date; [stage] angles_deg, placement; [target] kind, rows, cols, pitch_mm, outer_radius_mm, direction_outer_radius_mm, direction"
+                "correct the line; the keys are [dataset] exclude; [board] kind, rows, cols, square_mm; [board.certificate] scale_ppm_sd, flatness_mm_sd, expansion_ppm_per_k, expansion_ppm_per_k_sd, calibrated_at_c, used_at_c, used_at_c_sd; [[camera]] name, width, height, images or image_list, target_images, optics, serial; [recording] name, by, date; [stage] angles_deg, placement; [poses] known; [target] kind, rows, cols, pitch_mm, outer_radius_mm, direction_outer_radius_mm, direction"
             }
             Self::Missing { .. } => {
                 "add it; rows and cols count inner corners, width and height are pixels"
@@ -346,7 +377,13 @@ impl Remedy for ManifestError {
             Self::OutOfRange { .. } => {
                 "rows and cols count inner corners (one less than squares), width and height are pixels of the image"
             }
-            Self::BoardKind { .. } => "write kind = \"chessboard\"",
+            Self::BoardKind { .. } => {
+                return Some(format!(
+                    "write kind = \"{}\"",
+                    BoardKind::ALL.map(BoardKind::word).join("\" or \"")
+                ));
+            }
+            Self::BoardKey { .. } => "remove the key, or write the kind that was meant",
             Self::CameraName { .. } => {
                 "use up to 64 letters, digits, '-', '_' and '.'; the name becomes part of CSV headers such as u_left"
             }
@@ -371,12 +408,17 @@ impl Remedy for ManifestError {
             Self::StageAngle { .. } => "give the dial reading in degrees, or leave angles_deg out",
             Self::ExcludedUnknown { .. } => "poses count from 0 in the natural order of the images",
             Self::NothingToRead { .. } => {
-                "add images = \"folder/*.png\" to the camera, or put corners.csv (camera,pose,row,col,u,v) into the folder"
+                "add images = \"folder/*.png\" to the camera, or put corners.csv (camera,pose,row,col,u,v; with kind = \"points\" camera,pose,u,v,x_mm,y_mm,z_mm) into the folder"
             }
             Self::Certificate { .. } => {
                 "give standard deviations in ppm and mm, temperatures in degrees Celsius, or leave the key out"
             }
             Self::Date { .. } => "write year-month-day, such as date = \"2026-11-30\"",
+            Self::NoPlaces { .. } => {
+                "write it with camera,pose,u,v,x_mm,y_mm,z_mm, one line for each point that a camera sees"
+            }
+            Self::Places { source } => return source.remedy(),
+            Self::KnownPoses { source } => return source.remedy(),
             Self::Target { problem, .. } => problem.remedy(),
         };
         Some(text.to_owned())

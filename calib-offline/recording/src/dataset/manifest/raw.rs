@@ -12,6 +12,7 @@ pub(super) struct RawManifest {
     #[serde(default)]
     pub camera: Vec<Spanned<RawCamera>>,
     pub stage: Option<RawStage>,
+    pub poses: Option<RawPoses>,
     pub target: Option<Spanned<RawTarget>>,
     pub recording: Option<RawRecording>,
 }
@@ -71,6 +72,12 @@ pub(super) struct RawCamera {
 pub(super) struct RawStage {
     pub angles_deg: Option<Spanned<Vec<f64>>>,
     pub placement: Option<Spanned<Vec<usize>>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawPoses {
+    pub known: Option<String>,
 }
 
 #[derive(Deserialize)]

@@ -1,16 +1,13 @@
 use super::*;
-use crate::dataset::CameraSpec;
+use crate::dataset::{BoardKind, CameraSpec};
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::{PixelPoint, SensorSize};
 
 fn dataset(names: &[&str]) -> Dataset {
     Dataset {
         folder: ".".into(),
-        board: BoardSpec {
-            rows: 5,
-            cols: 4,
-            square_mm: 10.0,
-        },
+        kind: BoardKind::Chessboard,
+        board: BoardSpec::chessboard(5, 4, 10.0),
         cameras: names
             .iter()
             .map(|name| CameraSpec {
@@ -22,6 +19,7 @@ fn dataset(names: &[&str]) -> Dataset {
             })
             .collect(),
         stage: None,
+        known_poses: [].into(),
         excluded_poses: [].into(),
         target: None,
         certificate: None,

@@ -18,7 +18,7 @@ fn rms_per_axis_px(noise: f64, blur_px: f64) -> f64 {
             let mut photo = tilted(board(6, 9), 7.0 + 11.0 * k as f64, tilt, 3.3, -2.1);
             (photo.noise, photo.blur_px) = (noise, blur_px);
             let image = photo.take();
-            let raw = ChessTopologicalDetector.detect(&image, &photo.board);
+            let raw = ChessTopologicalDetector.detect(&image, &photo.board.clone());
             let half_px = DetectSettings::default().max_half_window_px;
             let grid = FittedGrid::from_raw(&image, &raw[0], &photo.board, half_px).unwrap();
             assert_eq!(grid.corners.len(), 54, "tilt {tilt:?}");
@@ -95,9 +95,11 @@ fn real_images_are_found_whole() {
     };
     let dataset = Dataset {
         folder: folder.clone(),
+        kind: BoardKind::Chessboard,
         board: board(6, 9),
         cameras: vec![camera("left"), camera("right")],
         stage: None,
+        known_poses: [].into(),
         excluded_poses: std::collections::BTreeSet::new(),
         target: None,
         certificate: None,

@@ -4,14 +4,14 @@ use super::*;
 
 /// Two cameras side by side that see boards turned and tilted as given (turn, tilt, tilt), the
 /// second one mounted turned by `second_turn_deg`.
-fn pair(board: BoardSpec, poses: &[[f64; 3]], second_turn_deg: f64) -> [Vec<Photo>; 2] {
+fn pair(board: &BoardSpec, poses: &[[f64; 3]], second_turn_deg: f64) -> [Vec<Photo>; 2] {
     let camera = |right_mm: f64, turn_deg: f64| {
         poses
             .iter()
             .map(|&[turn, x, y]| {
                 // A board in the hand or beside the axis moves with its tilt.
                 let (away_mm, down_mm) = (0.6 * y, -0.5 * x);
-                let mut photo = tilted(board, turn, [x, y], right_mm + away_mm, down_mm);
+                let mut photo = tilted(board.clone(), turn, [x, y], right_mm + away_mm, down_mm);
                 photo.px_from_board = turned_image(turn_deg) * photo.px_from_board;
                 photo
             })
@@ -56,7 +56,7 @@ fn a_stage_that_turns_an_odd_by_odd_board_upside_down_keeps_its_labels() {
     let poses: Vec<[f64; 3]> = (0..8)
         .map(|k| [-30.0 + 40.0 * f64::from(k), 15.0, 10.0 - 4.0 * f64::from(k)])
         .collect();
-    let cameras = pair(board(7, 9), &poses, 0.0);
+    let cameras = pair(&board(7, 9), &poses, 0.0);
     let found = detect(&dataset(folder.path(), board(7, 9), true, &cameras)).unwrap();
     assert_eq!(sides(&found, &cameras), vec![1; 16]);
     // Six of eight poses are turned by more than 45 degrees against the first one or two.
@@ -72,7 +72,7 @@ fn a_camera_mounted_upside_down_is_recognized_by_epipolar_geometry() {
         [-5.0, 0.0, 30.0],
         [3.0, 10.0, -30.0],
     ];
-    let cameras = pair(board(7, 9), &poses, 180.0);
+    let cameras = pair(&board(7, 9), &poses, 180.0);
     let found = detect(&dataset(folder.path(), board(7, 9), false, &cameras)).unwrap();
     assert_eq!(sides(&found, &cameras), vec![1; 8]);
 }
@@ -80,7 +80,7 @@ fn a_camera_mounted_upside_down_is_recognized_by_epipolar_geometry() {
 #[test]
 fn one_pair_of_upright_cameras_is_taken_as_upright() {
     let folder = tempfile::tempdir().unwrap();
-    let cameras = pair(board(6, 8), &[[20.0, 20.0, 10.0]], 0.0);
+    let cameras = pair(&board(6, 8), &[[20.0, 20.0, 10.0]], 0.0);
     let found = detect(&dataset(folder.path(), board(6, 8), false, &cameras)).unwrap();
     assert_eq!(sides(&found, &cameras), vec![1; 2]);
 }
@@ -88,7 +88,7 @@ fn one_pair_of_upright_cameras_is_taken_as_upright() {
 #[test]
 fn one_pair_with_a_camera_on_its_side_is_an_error_that_says_so() {
     let folder = tempfile::tempdir().unwrap();
-    let cameras = pair(board(6, 8), &[[0.0, 0.0, 0.0]], 85.0);
+    let cameras = pair(&board(6, 8), &[[0.0, 0.0, 0.0]], 85.0);
     let error = detect(&dataset(folder.path(), board(6, 8), false, &cameras)).unwrap_err();
     assert!(
         matches!(
@@ -104,7 +104,7 @@ fn one_pair_with_a_camera_on_its_side_is_an_error_that_says_so() {
 fn a_stage_turned_by_a_right_angle_between_poses_is_an_error_that_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let cameras = pair(
-        board(7, 9),
+        &board(7, 9),
         &[[0.0, 5.0, 0.0], [20.0, 5.0, 0.0], [108.0, 5.0, 0.0]],
         0.0,
     );
@@ -126,7 +126,7 @@ fn a_hand_held_board_at_right_angles_has_the_same_labels_in_both_cameras() {
         [180.0, 0.0, 30.0],
         [268.0, 10.0, -30.0],
     ];
-    let cameras = pair(board(7, 9), &poses, 0.0);
+    let cameras = pair(&board(7, 9), &poses, 0.0);
     let found = detect(&dataset(folder.path(), board(7, 9), false, &cameras)).unwrap();
     let sides = sides(&found, &cameras);
     assert_eq!(sides[..4], sides[4..]);
@@ -139,7 +139,7 @@ fn a_square_even_board_is_followed_through_small_turns() {
     let poses: Vec<[f64; 3]> = (0..7)
         .map(|k| [25.0 * f64::from(k), 15.0, 5.0 * f64::from(k)])
         .collect();
-    let cameras = pair(board(8, 8), &poses, 0.0);
+    let cameras = pair(&board(8, 8), &poses, 0.0);
     let found = detect(&dataset(folder.path(), board(8, 8), true, &cameras)).unwrap();
     assert_eq!(sides(&found, &cameras), vec![1; 14]);
 }
@@ -148,7 +148,7 @@ fn a_square_even_board_is_followed_through_small_turns() {
 fn a_part_without_borders_is_placed_by_its_neighbors_on_the_stage() {
     let folder = tempfile::tempdir().unwrap();
     let poses: Vec<[f64; 3]> = (0..4).map(|k| [0.0, 5.0 * f64::from(k), 10.0]).collect();
-    let mut cameras = pair(board(7, 9), &poses, 0.0);
+    let mut cameras = pair(&board(7, 9), &poses, 0.0);
     // Only the middle of the board is left in one pose of the first camera.
     let photo = &mut cameras[0][2];
     let (a, b) = (photo.true_corner(1, 1), photo.true_corner(5, 7));
@@ -180,7 +180,7 @@ fn a_mirror_before_one_camera_shows_in_the_pair_check() {
         [-15.0, 0.0, 30.0],
         [3.0, 10.0, -30.0],
     ];
-    let mut cameras = pair(board(6, 9), &poses, 0.0);
+    let mut cameras = pair(&board(6, 9), &poses, 0.0);
     let straight = detect(&dataset(folder.path(), board(6, 9), false, &cameras)).unwrap();
     assert!(straight.pair_checks[0].median_px < 0.1);
     for photo in &mut cameras[1] {
@@ -198,7 +198,7 @@ fn a_mirror_before_one_camera_shows_in_the_pair_check() {
 fn excluded_poses_are_not_looked_at_and_missing_images_leave_gaps() {
     let folder = tempfile::tempdir().unwrap();
     let poses = [[0.0, 20.0, 0.0], [10.0, -20.0, 5.0], [-5.0, 0.0, 30.0]];
-    let cameras = pair(board(6, 9), &poses, 0.0);
+    let cameras = pair(&board(6, 9), &poses, 0.0);
     let mut set = dataset(folder.path(), board(6, 9), false, &cameras);
     set.excluded_poses.insert(0);
     set.cameras[1].images[1] = None;

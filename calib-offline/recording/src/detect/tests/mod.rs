@@ -10,7 +10,7 @@ mod single;
 use photo::{Photo, tilted};
 
 use super::*;
-use crate::dataset::{CameraSpec, StageSpec};
+use crate::dataset::{BoardKind, CameraSpec, StageSpec};
 use crate::detect::consistency::ConsistencyError;
 use calib_rays::geometry::SensorSize;
 use calib_rays::progress::Silent;
@@ -19,11 +19,7 @@ use std::path::Path;
 const SENSOR: SensorSize = SensorSize::new(640, 480);
 
 fn board(rows: usize, cols: usize) -> BoardSpec {
-    BoardSpec {
-        rows,
-        cols,
-        square_mm: 10.0,
-    }
+    BoardSpec::chessboard(rows, cols, 10.0)
 }
 
 /// Writes the photos as PNG and describes them as a dataset; one list of photos per camera.
@@ -49,9 +45,11 @@ fn dataset(folder: &Path, board: BoardSpec, stage: bool, cameras: &[Vec<Photo>])
         .collect();
     Dataset {
         folder: folder.to_path_buf(),
+        kind: BoardKind::Chessboard,
         board,
         cameras,
         stage: stage.then(StageSpec::default),
+        known_poses: [].into(),
         excluded_poses: std::collections::BTreeSet::new(),
         target: None,
         certificate: None,

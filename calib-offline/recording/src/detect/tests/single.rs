@@ -5,7 +5,7 @@ use calib_rays::remedy::Remedy;
 
 fn only(photo: Photo) -> Detection {
     let folder = tempfile::tempdir().unwrap();
-    let board = photo.board;
+    let board = photo.board.clone();
     detect(&dataset(folder.path(), board, false, &[vec![photo]])).unwrap()
 }
 
@@ -101,7 +101,7 @@ fn a_covered_corner_of_the_board_is_missing_and_the_others_keep_their_labels() {
 fn a_part_without_borders_is_refused_and_not_guessed() {
     // The board is larger than the image on all sides.
     let photo = tilted(board(30, 41), 0.0, [10.0, -20.0], 0.0, 0.0);
-    let refused = refusal(photo.board, photo);
+    let refused = refusal(photo.board.clone(), photo);
     assert!(
         matches!(refused, Refusal::AmbiguousPlacement { placement_count, .. } if placement_count > 2),
         "{refused:?}"
@@ -122,7 +122,7 @@ fn a_cover_across_the_board_is_not_taken_for_its_border() {
         photo
             .covers
             .push(([photo.true_corner(3, 9).u - 9.0, 0.0, 640.0, 480.0], value));
-        let refused = refusal(photo.board, photo);
+        let refused = refusal(photo.board.clone(), photo);
         assert!(
             matches!(refused, Refusal::AmbiguousPlacement { .. }),
             "cover {value}: {refused:?}"
@@ -146,18 +146,18 @@ fn images_without_a_board_say_why() {
     let mut photo = tilted(board(6, 9), 0.0, [10.0, -20.0], 0.0, 0.0);
     photo.levels = [30.0, 33.0, 32.0];
     assert!(matches!(
-        refusal(photo.board, photo.clone()),
+        refusal(photo.board.clone(), photo.clone()),
         Refusal::Illegible(Illegible::LowContrast { .. })
     ));
     photo.levels = [100.0, 100.0, 100.0];
     photo.noise = 25.0;
     assert!(matches!(
-        refusal(photo.board, photo.clone()),
+        refusal(photo.board.clone(), photo.clone()),
         Refusal::NoBoard
     ));
     photo = tilted(board(6, 9), 0.0, [10.0, -20.0], 0.0, 0.0);
     photo.blur_px = 14.0;
-    let refused = refusal(photo.board, photo);
+    let refused = refusal(photo.board.clone(), photo);
     assert!(
         matches!(refused, Refusal::Illegible(Illegible::Blurred { .. })),
         "{refused:?}"
@@ -204,7 +204,7 @@ fn an_image_of_another_size_or_no_image_is_refused_by_name() {
     let photo = tilted(board(6, 9), 0.0, [0.0, 0.0], 0.0, 0.0);
     let mut set = dataset(
         folder.path(),
-        photo.board,
+        photo.board.clone(),
         false,
         &[vec![photo.clone(), photo]],
     );
