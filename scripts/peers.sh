@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Other tools on the same data, in one run: OpenCV's calibration of stored corners against the stored figures, OpenCV's
-# triangulation and mrcal's splined solve against ours in CPU seconds. Installs OpenCV into a virtual environment under
+# triangulation and mrcal's splined solve against ours in CPU seconds, OpenCV's detectors of printed targets on rendered images. Installs OpenCV into a virtual environment under
 # target/peers and mrcal by apt-get where they are missing.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -28,3 +28,6 @@ cargo bench --locked -p calib-offline --bench throughput
 
 printf '\n==> mrcal: the same corners, splined\n'
 cargo bench --locked -p calib-offline --bench estimate -- brown port
+
+printf '\n==> OpenCV: printed targets on the same images\n'
+cargo bench --locked -p calib-offline --bench targets -- --images 200 --opencv "$environment/bin/python"

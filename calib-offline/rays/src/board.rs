@@ -19,7 +19,7 @@ pub struct BoardSpec {
     /// Pitch of the corners, mm; of listed places the distance to the next one, in the mean.
     pub square_mm: f64,
     /// Where the labels lie.
-    #[serde(default, skip_serializing_if = "Layout::is_grid")]
+    #[serde(default, skip_serializing_if = "Layout::is_even")]
     pub layout: Layout,
 }
 
@@ -30,6 +30,8 @@ pub enum Layout {
     /// Inner corners of a chessboard, pitch `square_mm`.
     #[default]
     Grid,
+    /// Places on a flat printed face, mm, row by row.
+    Face(#[schemars(with = "Vec<[f64; 2]>")] Arc<[[f64; 2]]>),
     /// Known places, by column; one row. They need not lie in a plane.
     Points(#[schemars(with = "Vec<KnownPlace>")] Arc<[KnownPlace]>),
 }
@@ -56,8 +58,13 @@ impl KnownPlace {
 }
 
 impl Layout {
-    /// Whether the places follow from rows, columns and pitch.
+    /// Whether the labels are rows and columns of a printed face.
     pub fn is_grid(&self) -> bool {
+        matches!(self, Self::Grid | Self::Face(_))
+    }
+
+    /// Whether the places follow from rows, columns and pitch.
+    pub fn is_even(&self) -> bool {
         matches!(self, Self::Grid)
     }
 }
@@ -83,11 +90,30 @@ impl BoardSpec {
         }
     }
 
+    /// A printed face with `rows` x `cols` points, mm.
+    pub fn face(rows: usize, cols: usize, place_mm: impl Fn(usize, usize) -> [f64; 2]) -> Self {
+        let labels = (0..rows).flat_map(|row| (0..cols).map(move |col| (row, col)));
+        let places: Vec<[f64; 2]> = labels.map(|(row, col)| place_mm(row, col)).collect();
+        let known: Vec<KnownPlace> = places
+            .iter()
+            .map(|[x, y]| KnownPlace::exact(Vector3::new(*x, *y, 0.0)))
+            .collect();
+        Self {
+            rows,
+            cols,
+            square_mm: mean_spacing_mm(&known),
+            layout: Layout::Face(places.into()),
+        }
+    }
+
     /// The same target, longer in every direction by a factor.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
         match &self.layout {
             Layout::Grid => Self::chessboard(self.rows, self.cols, self.square_mm * factor),
+            Layout::Face(places) => Self::face(self.rows, self.cols, |row, col| {
+                places[row * self.cols + col].map(|mm| mm * factor)
+            }),
             Layout::Points(places) => Self::points(
                 places
                     .iter()
@@ -103,7 +129,7 @@ impl BoardSpec {
     /// The shape that nothing is known of yet: of a printed face, total degree two; none where places are known.
     pub fn unknown_shape(&self) -> BoardShape {
         match &self.layout {
-            Layout::Grid => BoardShape::flat_of_degree_two(),
+            Layout::Grid | Layout::Face(_) => BoardShape::flat_of_degree_two(),
             Layout::Points(_) => BoardShape::default(),
         }
     }
@@ -111,7 +137,7 @@ impl BoardSpec {
     /// Standard deviation of each coordinate of a label's place, mm; 0 where it counts as exact.
     pub fn place_sigma_mm(&self, col: usize) -> f64 {
         match &self.layout {
-            Layout::Grid => 0.0,
+            Layout::Grid | Layout::Face(_) => 0.0,
             Layout::Points(places) => places.get(col).map_or(0.0, |place| place.sigma_mm),
         }
     }
@@ -120,7 +146,7 @@ impl BoardSpec {
     /// and columns; of listed places the next in the list, if it is near.
     pub fn next_to(&self, row: usize, col: usize) -> impl Iterator<Item = (usize, usize)> {
         let along = match &self.layout {
-            Layout::Grid => true,
+            Layout::Grid | Layout::Face(_) => true,
             Layout::Points(places) => {
                 let next = places.get(col + 1);
                 next.is_some_and(|next| {
@@ -138,7 +164,7 @@ impl BoardSpec {
     }
 
     /// Nominal position of a corner in the board frame, mm: `(col, row, 0) * square_mm`, or the place that is
-    /// listed for the column, no number if there is none.
+    /// listed for it, no number if there is none.
     pub fn corner_in_board(&self, row: usize, col: usize) -> Vector3<f64> {
         match &self.layout {
             Layout::Grid => Vector3::new(
@@ -146,6 +172,9 @@ impl BoardSpec {
                 row as f64 * self.square_mm,
                 0.0,
             ),
+            Layout::Face(places) => places
+                .get(row * self.cols + col)
+                .map_or_else(|| Vector3::repeat(f64::NAN), on_face),
             Layout::Points(places) => places
                 .get(col)
                 .map_or_else(|| Vector3::repeat(f64::NAN), |place| place.at_mm),
@@ -159,8 +188,12 @@ impl BoardSpec {
                 let (width_mm, height_mm) = self.extent_mm();
                 Vector3::new(width_mm / 2.0, height_mm / 2.0, 0.0)
             }
+            Layout::Face(places) => {
+                let (least, most) = bounds(places.iter().map(on_face));
+                (least + most) / 2.0
+            }
             Layout::Points(places) => {
-                let (least, most) = bounds(places);
+                let (least, most) = bounds(places.iter().map(|place| place.at_mm));
                 (least + most) / 2.0
             }
         }
@@ -173,8 +206,12 @@ impl BoardSpec {
                 self.cols.saturating_sub(1) as f64 * self.square_mm,
                 self.rows.saturating_sub(1) as f64 * self.square_mm,
             ),
+            Layout::Face(places) => {
+                let (least, most) = bounds(places.iter().map(on_face));
+                (most.x - least.x, most.y - least.y)
+            }
             Layout::Points(places) => {
-                let (least, most) = bounds(places);
+                let (least, most) = bounds(places.iter().map(|place| place.at_mm));
                 (most.x - least.x, most.y - least.y)
             }
         }
@@ -182,7 +219,7 @@ impl BoardSpec {
 
     /// Distance between the places of neighboring labels ([`Self::next_to`]), mm.
     pub fn apart_mm(&self, first: (usize, usize), second: (usize, usize)) -> f64 {
-        if self.layout.is_grid() {
+        if self.layout.is_even() {
             return self.square_mm;
         }
         (self.corner_in_board(first.0, first.1) - self.corner_in_board(second.0, second.1)).norm()
@@ -193,6 +230,10 @@ impl BoardSpec {
         match &self.layout {
             Layout::Grid => format!(
                 "{} rows x {} cols of inner corners, {} mm",
+                self.rows, self.cols, self.square_mm
+            ),
+            Layout::Face(_) => format!(
+                "{} rows x {} cols of printed points, {:.3} mm apart",
                 self.rows, self.cols, self.square_mm
             ),
             Layout::Points(places) => format!("{} points with known places", places.len()),
@@ -212,7 +253,7 @@ impl BoardSpec {
     /// So it is when rows and columns are both odd or both even; a board with one of each can be
     /// told apart by the color of its corner square. Listed places are told apart by their labels.
     pub fn looks_same_after_half_turn(&self) -> bool {
-        self.layout.is_grid() && self.rows % 2 == self.cols % 2
+        self.layout.is_even() && self.rows % 2 == self.cols % 2
     }
 
     /// The label that a corner gets when the board is numbered from the opposite end.
@@ -221,11 +262,16 @@ impl BoardSpec {
     }
 }
 
+/// A place on a printed face, mm.
+fn on_face([x, y]: &[f64; 2]) -> Vector3<f64> {
+    Vector3::new(*x, *y, 0.0)
+}
+
 /// Least and most of each coordinate; zero without points.
-fn bounds(places: &[KnownPlace]) -> (Vector3<f64>, Vector3<f64>) {
-    let first = places.first().map_or_else(Vector3::zeros, |p| p.at_mm);
-    places.iter().fold((first, first), |(least, most), place| {
-        (least.inf(&place.at_mm), most.sup(&place.at_mm))
+fn bounds(mut places_mm: impl Iterator<Item = Vector3<f64>>) -> (Vector3<f64>, Vector3<f64>) {
+    let first = places_mm.next().unwrap_or_else(Vector3::zeros);
+    places_mm.fold((first, first), |(least, most), place| {
+        (least.inf(&place), most.sup(&place))
     })
 }
 

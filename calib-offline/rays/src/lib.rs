@@ -10,5 +10,6 @@ pub mod in_order;
 pub mod measure;
 pub mod numerics;
 pub mod observed;
+pub mod print;
 pub mod progress;
 pub mod remedy;

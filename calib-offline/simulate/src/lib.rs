@@ -22,6 +22,7 @@ pub mod random;
 pub mod render;
 pub mod scene;
 pub mod settings;
+pub mod shots;
 pub mod stage;
 mod tables;
 pub mod tank;

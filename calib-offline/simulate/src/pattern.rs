@@ -1,10 +1,12 @@
-//! What is printed on a flat plate: a chessboard or a target of ring markers.
+//! What is printed on a flat plate: a chessboard, a target of ring markers, or any artwork.
 //!
 //! A pattern is black (0) or white (1) at every point of its plane, mm, in the frame of its plate:
 //! origin at the first corner or marker, x along the columns, y along the rows, z away from the
 //! printed face. The plate ends where the white margin does; beyond it is background.
 
 use calib_rays::board::BoardSpec;
+use calib_rays::print::Artwork;
+use std::sync::Arc;
 
 /// A printed plate.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,6 +15,8 @@ pub enum Pattern {
     Chessboard(BoardSpec),
     /// The measurement target.
     RingTarget,
+    /// Any other print.
+    Printed(Arc<Artwork>),
 }
 
 /// Marker rows and columns of the ring target: 63 markers.
@@ -64,6 +68,7 @@ impl Pattern {
                 -RING_MARGIN_MM,
                 (RING_ROWS - 1) as f64 * RING_PITCH_MM + RING_MARGIN_MM,
             ],
+            Self::Printed(art) => art.plate_mm,
         }
     }
 
@@ -81,6 +86,14 @@ impl Pattern {
         let print = match self {
             Self::Chessboard(board) => chess(board, x, y),
             Self::RingTarget => ring(x, y),
+            Self::Printed(art) => {
+                let shade = art.shade(x, y);
+                Shade {
+                    ink: Some(ink(shade.black)),
+                    beyond: Some(ink(shade.black_beyond)),
+                    edge_mm: shade.edge_mm,
+                }
+            }
         };
         if print.edge_mm < inside {
             print

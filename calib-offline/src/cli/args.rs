@@ -3,7 +3,7 @@
 use super::settings::CommonArgs;
 use super::{
     calibrate, compare, demo, detect, device, evaluate, export, flash, inspect, measure, methods,
-    pack, simulate, verify,
+    pack, simulate, target, verify,
 };
 use clap::{Parser, Subcommand};
 
@@ -77,6 +77,8 @@ pub enum Verb {
     /// Make a dataset with known truth
     #[command(before_help = SIMULATE_EXAMPLE, after_help = SIMULATE_FORMATS)]
     Simulate(simulate::SimulateArgs),
+    /// Draw a calibration target to print, with its [board]
+    Target(target::TargetArgs),
     /// Say whether an old calibration still holds, by a few new poses, and what changed
     Verify(verify::VerifyArgs),
 }

@@ -33,6 +33,7 @@ mod rig_file;
 mod run;
 pub mod settings;
 pub mod simulate;
+pub mod target;
 pub mod usage_error;
 pub mod verify;
 

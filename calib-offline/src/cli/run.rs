@@ -7,7 +7,7 @@ use super::output::Console;
 use super::settings::Settings;
 use super::{
     calibrate, compare, demo, device, evaluate, export, failure, flash, inspect, measure, methods,
-    pack, recording, verify,
+    pack, recording, target, verify,
 };
 use clap::Parser;
 use std::process::ExitCode;
@@ -47,6 +47,7 @@ fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
         Verb::Methods(args) => methods::run(args, console),
         Verb::Pack(args) => pack::run(args, console),
         Verb::Simulate(args) => recording::simulate(args, console),
+        Verb::Target(args) => target::run(args, console),
         Verb::Verify(args) => verify::run(args, console),
     }
 }

@@ -23,6 +23,12 @@ pub enum UsageError {
         /// What it could have been.
         expected: &'static str,
     },
+    /// A kind of target that is not printed.
+    #[error("kind = \"{kind}\" has no print of its own")]
+    NothingToPrint {
+        /// The kind.
+        kind: &'static str,
+    },
     /// There is no such file.
     #[error("{}: does not exist", path.display())]
     NotFound {
@@ -96,6 +102,9 @@ impl Remedy for UsageError {
         let text = match self {
             Self::Exists { .. } => "choose another place, or replace it with --force",
             Self::UnknownKind { .. } | Self::NotFound { .. } => "check the path",
+            Self::NothingToPrint { .. } => {
+                "choose chessboard, charuco, aprilgrid, circles or rings"
+            }
             Self::UnknownFrame { .. } => {
                 "leave --frame out for the rig's own frame, or name one of its cameras"
             }

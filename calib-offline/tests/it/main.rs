@@ -18,6 +18,7 @@ mod lengths;
 mod match_noise;
 mod methods;
 mod point_sigma;
+mod printed_targets;
 mod schemas;
 mod starting_points;
 mod target_command;

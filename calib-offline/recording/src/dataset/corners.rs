@@ -92,7 +92,7 @@ fn rows(dataset: &Dataset, file: &Path, text: &str) -> Result<Vec<Row>, CornersE
     let header = lines.next().map_or("", |(_, line)| line.trim());
     // As in the rows, blanks and quotes around a name mean nothing.
     let names: Vec<&str> = header.split(',').map(unquoted).collect();
-    let columns = Columns::of(&names.join(","), dataset.kind).ok_or_else(|| {
+    let columns = Columns::of(&names.join(","), &dataset.kind).ok_or_else(|| {
         if text.trim().is_empty() {
             CornersError::Empty {
                 file: file.to_owned(),
@@ -102,7 +102,7 @@ fn rows(dataset: &Dataset, file: &Path, text: &str) -> Result<Vec<Row>, CornersE
             CornersError::Header {
                 file: file.to_owned(),
                 found: shortened(header),
-                kind: dataset.kind,
+                kind: Box::new(dataset.kind.clone()),
             }
         }
     })?;

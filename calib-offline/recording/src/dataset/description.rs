@@ -4,6 +4,7 @@ use super::target::TargetSpec;
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::SensorSize;
 use calib_rays::observed::KnownPose;
+use calib_rays::print::{AprilGrid, Charuco, Circles};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -74,31 +75,47 @@ impl Dataset {
 
 /// What a calibration target is: `[board] kind`. A kind with facts of its own that only a detector needs
 /// carries them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub enum BoardKind {
     /// The inner corners of a chessboard.
     #[default]
     Chessboard,
+    /// A chessboard with a dot in the middle of some squares: (row, col), from 0 at the upper left.
+    MarkedChessboard(Vec<(usize, usize)>),
+    /// A chessboard with a coded marker in each white square.
+    Charuco(Charuco),
+    /// A grid of `AprilTags`.
+    AprilGrid(AprilGrid),
+    /// A grid of circles.
+    Circles(Circles),
+    /// A grid of rings, some of them larger.
+    Rings(TargetSpec),
     /// Points with known places, which stand in the file of corners.
     Points,
 }
 
 impl BoardKind {
-    /// All of them.
-    pub const ALL: [Self; 2] = [Self::Chessboard, Self::Points];
+    /// The words of all of them in the manifest.
+    pub const WORDS: [&str; 6] = [
+        "chessboard",
+        "charuco",
+        "aprilgrid",
+        "circles",
+        "rings",
+        "points",
+    ];
 
     /// The word in the manifest.
-    pub const fn word(self) -> &'static str {
+    pub const fn word(&self) -> &'static str {
         match self {
-            Self::Chessboard => "chessboard",
-            Self::Points => "points",
+            Self::Chessboard | Self::MarkedChessboard(_) => Self::WORDS[0],
+            Self::Charuco(_) => Self::WORDS[1],
+            Self::AprilGrid(_) => Self::WORDS[2],
+            Self::Circles(_) => Self::WORDS[3],
+            Self::Rings(_) => Self::WORDS[4],
+            Self::Points => Self::WORDS[5],
         }
-    }
-
-    /// The kind with this word.
-    pub fn from_word(word: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.word() == word)
     }
 }
 

@@ -1,6 +1,7 @@
 //! A name for what went into a calibration: equal exactly when the facts are equal.
 
 use super::Dataset;
+use calib_rays::board::Layout;
 use calib_rays::observed::View;
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
@@ -31,6 +32,9 @@ pub fn input_sha256(dataset: &Dataset, views: &[View]) -> String {
     }
     for (pose, known) in &dataset.known_poses {
         let _ = writeln!(facts, "known {pose} {known:?}");
+    }
+    if let Layout::Face(places) = &dataset.board.layout {
+        let _ = writeln!(facts, "face {places:?}");
     }
     for col in 0..dataset.board.cols {
         if dataset.board.layout.is_grid() {

@@ -209,11 +209,13 @@ impl GrayImage {
         }
     }
 
-    /// The value of a pixel, or `None` outside the image.
+    /// The value of a pixel, or `None` outside the image and where it is covered (not a number).
     pub fn at(&self, u: i64, v: i64) -> Option<f32> {
         let inside = (0..i64::from(self.sensor.width)).contains(&u)
             && (0..i64::from(self.sensor.height)).contains(&v);
-        inside.then(|| self.values[v as usize * self.sensor.width as usize + u as usize])
+        inside
+            .then(|| self.values[v as usize * self.sensor.width as usize + u as usize])
+            .filter(|value| !value.is_nan())
     }
 
     /// The value between pixels, bilinear; `None` outside the outermost pixel centers.

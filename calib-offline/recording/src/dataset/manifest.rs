@@ -2,15 +2,20 @@
 //! that cannot be meant; each names the line.
 
 mod board;
+mod board_problem;
+mod board_text;
 mod declared;
 mod error;
 mod images;
 mod limits;
+mod printed_board;
 mod raw;
 mod source;
 mod target;
 mod target_problem;
 
+pub use board_problem::BoardProblem;
+pub use board_text::read_board;
 pub use error::ManifestError;
 pub use limits::{
     MAX_CAMERAS, MAX_CORNERS_PER_SIDE, MAX_NAME_CHARS, MAX_SENSOR_PX, MAX_SQUARE_MM,

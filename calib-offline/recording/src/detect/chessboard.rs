@@ -144,6 +144,43 @@ impl Scale {
     }
 }
 
+/// A size at which an image is searched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Size {
+    /// As it is.
+    Full,
+    /// Half.
+    Half,
+    /// A quarter.
+    Quarter,
+    /// Double.
+    Double,
+}
+
+/// The sizes in the order in which they are tried.
+pub const SIZES: [Size; 4] = [Size::Full, Size::Half, Size::Quarter, Size::Double];
+
+impl Size {
+    /// Whether the image is searched larger than it is.
+    pub fn is_enlarged(self) -> bool {
+        self == Self::Double
+    }
+}
+
+/// The corners of every connected grid in an image searched at a size, each numbered from an origin of
+/// its own, the largest first.
+pub fn parts_at(image: &GrayImage, size: Size) -> Vec<Vec<RawCorner>> {
+    let at = |resized: Option<GrayImage>, scale: Scale| {
+        resized.map_or_else(Vec::new, |resized| detect_at(&resized, scale))
+    };
+    match size {
+        Size::Full => detect_at(image, Scale::FULL),
+        Size::Half => at(image.halved(), SCALES[1]),
+        Size::Quarter => at(image.halved().and_then(|half| half.halved()), SCALES[2]),
+        Size::Double => at(image.doubled(), Scale::DOUBLE),
+    }
+}
+
 fn detect_at(image: &GrayImage, scale: Scale) -> Vec<Vec<RawCorner>> {
     let [black, white] = image.quantiles(STRETCH_QUANTILES);
     let stretched = image.stretched(black, white);

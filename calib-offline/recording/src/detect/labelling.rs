@@ -17,11 +17,17 @@ pub struct Placement {
 }
 
 impl Placement {
+    /// Column and row (in this order) of a node, on the board or beyond it.
+    pub fn place(&self, node: Node) -> (i32, i32) {
+        let (x, y) = turned(node, self.quarter_turns);
+        (x + self.col_shift, y + self.row_shift)
+    }
+
     /// Row and column of a node; they are on the board for every node of the grid that the
     /// placement was made for.
     pub fn row_col(&self, node: Node) -> (usize, usize) {
-        let (x, y) = turned(node, self.quarter_turns);
-        ((y + self.row_shift) as usize, (x + self.col_shift) as usize)
+        let (x, y) = self.place(node);
+        (y as usize, x as usize)
     }
 
     /// Whether a node, one of the grid or not, is on the board.

@@ -22,11 +22,14 @@ pub mod grid_size;
 pub mod illegible;
 mod job;
 pub mod labelling;
+pub mod marked;
 pub mod overlay;
 mod pair_check;
 mod pixel_edge;
+pub mod printed;
 pub mod ring_target;
 mod scatter;
+mod seen_board;
 mod settings;
 pub mod turning;
 pub mod verdict;
@@ -34,10 +37,11 @@ pub mod verdict;
 pub use detection::{Detection, TurnedImage};
 pub use error::{DetectError, OddImage};
 pub use pair_check::PairCheck;
+pub use seen_board::SeenBoard;
 pub use settings::DetectSettings;
 
-use crate::dataset::Dataset;
 use crate::dataset::image::{GrayImage, ImageError, bayer};
+use crate::dataset::{BoardKind, Dataset};
 use border::Borders;
 use calib_rays::board::BoardSpec;
 use calib_rays::observed::{Corner, View};
@@ -96,12 +100,15 @@ pub fn detect_dataset_with(
         return Err(DetectError::NoImages);
     }
     check_sizes(dataset, &jobs)?;
+    if let Some(target) = printed::of_kind(&dataset.kind) {
+        return printed::detect(target, dataset, &jobs, settings, progress);
+    }
     progress.begin("detecting corners", jobs.len());
     let loaded: Vec<Result<Result<Inspected, Refusal>, ImageError>> = jobs
         .par_iter()
         .map(|job| {
             let result = GrayImage::load_sized(job.path, job.sensor)
-                .map(|image| inspect(detector, &image, &dataset.board, settings));
+                .map(|image| inspect(detector, &image, dataset, settings));
             progress.advance();
             result
         })
@@ -244,13 +251,13 @@ fn check_count(
 fn inspect(
     detector: &dyn ChessboardDetector,
     image: &GrayImage,
-    board: &BoardSpec,
+    dataset: &Dataset,
     settings: &DetectSettings,
 ) -> Result<Inspected, Refusal> {
-    let found = inspect_gray(detector, image, board, settings);
+    let found = inspect_gray(detector, image, dataset, settings);
     match found {
         Err(_) => match bayer::balanced(image) {
-            Some(balanced) => inspect_gray(detector, &balanced, board, settings),
+            Some(balanced) => inspect_gray(detector, &balanced, dataset, settings),
             None => found,
         },
         found => found,
@@ -260,13 +267,14 @@ fn inspect(
 fn inspect_gray(
     detector: &dyn ChessboardDetector,
     image: &GrayImage,
-    board: &BoardSpec,
+    dataset: &Dataset,
     settings: &DetectSettings,
 ) -> Result<Inspected, Refusal> {
+    let board = &dataset.board;
     let grids = detector.detect(image, board);
     let mut best = Err(None);
     for raw in &grids {
-        match (inspect_grid(image, raw, board, settings), &best) {
+        match (inspect_grid(image, raw, dataset, settings), &best) {
             (Ok(found), Ok(Inspected { grid, .. }))
                 if found.grid.corners.len() <= grid.corners.len() => {}
             (Ok(found), _) => best = Ok(found),
@@ -275,16 +283,28 @@ fn inspect_gray(
             (Err(_), _) => {}
         }
     }
-    best.map_err(|refusal| refusal.unwrap_or_else(|| why_nothing_found(image)))
+    best.map_err(|refusal| {
+        let largest = grids.first().map_or(&[][..], Vec::as_slice);
+        printed::charuco_seen::instead_of_chessboard(image, largest, board)
+            .or(refusal)
+            .unwrap_or_else(|| why_nothing_found(image))
+    })
 }
 
 /// What one grid of an image shows.
 fn inspect_grid(
     image: &GrayImage,
     raw: &[RawCorner],
-    board: &BoardSpec,
+    dataset: &Dataset,
     settings: &DetectSettings,
 ) -> Result<Inspected, Refusal> {
+    let board = &dataset.board;
+    let marked = match &dataset.kind {
+        BoardKind::MarkedChessboard(marked) => Some((marked, marked::squares(image, raw))),
+        _ => None,
+    };
+    let without_dots = marked.as_ref().map(|(_, s)| marked::without_dots(image, s));
+    let image = without_dots.as_ref().unwrap_or(image);
     let grid = FittedGrid::from_raw(image, raw, board, settings.max_half_window_px)
         .ok_or_else(|| why_nothing_found(image))?;
     let figures = ImageFigures::of(image, &grid);
@@ -299,7 +319,16 @@ fn inspect_grid(
     } else {
         Borders::seen(image, &grid)
     };
-    let placements = placements(&grid, board, &borders);
+    let mut placements = placements(&grid, board, &borders);
+    if let (Some((marked, squares)), false) = (&marked, placements.is_empty()) {
+        placements = marked::agreeing(placements, squares, marked);
+        if placements.is_empty() {
+            return Err(Refusal::OtherMarks {
+                marked: marked::dots(squares),
+                stated: marked.len(),
+            });
+        }
+    }
     if placements.is_empty() {
         let refusal = why_not_placed(&grid, board, &Borders::seen(image, &grid));
         return match figures.and_then(|figures| figures.illegible()) {

@@ -5,6 +5,8 @@ use super::grid::{FittedGrid, Typical};
 use super::grid_size::GridSize;
 use super::illegible::{EDGE_WIDTH_OF_BLUR, Illegible, Shown};
 use super::labelling::Placement;
+use super::ring_target::TargetRefusal;
+use super::seen_board::SeenBoard;
 use crate::dataset::image::GrayImage;
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::{PixelPoint, SensorSize};
@@ -35,11 +37,25 @@ pub struct MissingCorner {
     pub row: usize,
     /// Column on the board.
     pub col: usize,
-    /// Where it must be for those that were found; `None` if that is outside the image.
+    /// Where it must be for those that were found; `None` if that is outside the image, and on targets other than
+    /// the chessboard, for which it is not predicted.
     pub pixel: Option<PixelPoint>,
 }
 
 impl MissingCorner {
+    /// The board's corners that are not among those found (row, column), without their places.
+    pub fn beside(found: impl Iterator<Item = (usize, usize)>, board: &BoardSpec) -> Vec<Self> {
+        let found: BTreeSet<(usize, usize)> = found.collect();
+        let all = (0..board.rows).flat_map(|row| (0..board.cols).map(move |col| (row, col)));
+        all.filter(|label| !found.contains(label))
+            .map(|(row, col)| Self {
+                row,
+                col,
+                pixel: None,
+            })
+            .collect()
+    }
+
     /// The board's corners that a placed grid lacks, by row and column.
     pub fn of(
         grid: &FittedGrid,
@@ -106,6 +122,57 @@ pub enum Refusal {
         stated: GridSize,
         /// Whether the image shows where that board ends, on all sides.
         is_whole: bool,
+    },
+    /// The target of rings.
+    #[error(transparent)]
+    Rings(#[from] TargetRefusal),
+    /// Tags in one row or one column.
+    #[error(
+        "the {tags} tags in view lie in one row or one column, so that up and down are open: show more rows \
+         and columns"
+    )]
+    TagsInLine {
+        /// Tags in view.
+        tags: usize,
+    },
+    /// Tags without the small squares at their corners.
+    #[error(
+        "{tags} tags are in view, and their corners are no crossings of edges: the grid needs its small black \
+         squares between the tags, and spacing of [board] must be that of the print"
+    )]
+    TagsWithoutCorners {
+        /// Tags in view.
+        tags: usize,
+    },
+    /// Circles that could be any of several parts of the grid.
+    #[error(
+        "{circle_count} circles are in view, and they fit on the grid in {placement_count} ways: show the whole \
+         grid, or give it marked circles (direction)"
+    )]
+    AmbiguousCircles {
+        /// Circles in view.
+        circle_count: usize,
+        /// Ways to place them.
+        placement_count: usize,
+    },
+    /// Dots that are not where they should be.
+    #[error(
+        "{marked} squares with a dot are in view, and not where the {stated} of marked = [[row, col], ...] are: count \
+         squares from 0 at the board's upper left, with a black square there"
+    )]
+    OtherMarks {
+        /// Squares with a dot.
+        marked: usize,
+        /// Marked squares in the manifest.
+        stated: usize,
+    },
+    /// Another target than the one described.
+    #[error("the image shows {seen}, the manifest describes {stated}: {}", seen.what_to_write())]
+    OtherBoard {
+        /// What is seen.
+        seen: SeenBoard,
+        /// What the manifest describes.
+        stated: String,
     },
     /// A part of the board that could be any of several parts.
     #[error(

@@ -38,14 +38,14 @@ pub enum CornersError {
         line: usize,
     },
     /// The first line is not the header.
-    #[error("{}:1: the header is \"{found}\", it must be {}", file.display(), headers(*kind))]
+    #[error("{}:1: the header is \"{found}\", it must be {}", file.display(), headers(kind))]
     Header {
         /// The file.
         file: PathBuf,
         /// What stands there, shortened.
         found: String,
         /// What the target is.
-        kind: BoardKind,
+        kind: Box<BoardKind>,
     },
     /// Too few or too many fields.
     #[error("{}:{line}: has {have} fields, the header has {need}", file.display())]
@@ -192,12 +192,20 @@ pub enum CornersError {
 }
 
 /// The headers that a target's file may have, in words.
-fn headers(kind: BoardKind) -> String {
+fn headers(kind: &BoardKind) -> String {
     match kind {
         BoardKind::Points => format!(
             "\"{POINTS_HEADER}\", \"{POINTS_HEADER_WITH_SIGMA}\" or \"{POINTS_HEADER_WITH_SIGMAS}\""
         ),
         _ => format!("\"{HEADER}\" or \"{HEADER_WITH_SIGMA}\""),
+    }
+}
+
+/// A kind whose corners are labelled in the other way.
+fn other_labels(kind: &BoardKind) -> BoardKind {
+    match kind {
+        BoardKind::Points => BoardKind::Chessboard,
+        _ => BoardKind::Points,
     }
 }
 
@@ -216,14 +224,9 @@ impl Remedy for CornersError {
                 "save the file with commas between the fields".to_owned()
             }
             Self::Header { found, kind, .. }
-                if BoardKind::ALL.iter().any(|other| {
-                    other != kind && Columns::of(&found.replace(' ', ""), *other).is_some()
-                }) =>
+                if Columns::of(&found.replace(' ', ""), &other_labels(kind)).is_some() =>
             {
-                let other = match kind {
-                    BoardKind::Points => BoardKind::Chessboard,
-                    _ => BoardKind::Points,
-                };
+                let other = other_labels(kind);
                 format!(
                     "the columns are those of [board] kind = \"{}\"",
                     other.word()

@@ -31,7 +31,7 @@ pub(super) enum Labels {
 
 impl Columns {
     /// Of a header; `None` if it is none of this kind of target.
-    pub fn of(header: &str, kind: BoardKind) -> Option<Self> {
+    pub fn of(header: &str, kind: &BoardKind) -> Option<Self> {
         let (kind, count) = match (kind, header) {
             (BoardKind::Points, POINTS_HEADER) => (Labels::Places, 7),
             (BoardKind::Points, POINTS_HEADER_WITH_SIGMA) => (Labels::Places, 8),

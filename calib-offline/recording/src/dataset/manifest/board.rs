@@ -3,6 +3,7 @@
 use super::declared;
 use super::error::ManifestError;
 use super::limits::{MAX_CORNERS_PER_SIDE, MAX_SQUARE_MM, MIN_CORNERS_PER_SIDE, MIN_SQUARE_MM};
+use super::printed_board::Reader;
 use super::raw::RawBoard;
 use super::source::{Source, ranged};
 use crate::dataset::description::{BoardKind, Certificate};
@@ -29,15 +30,28 @@ pub(super) fn declared(
     let line = source.line_of(&raw);
     let mut raw = raw.into_inner();
     let kind = kind(source, &raw)?;
+    check_keys(source, &raw, kind)?;
     let certificate = raw.certificate.take();
     let certificate = certificate
         .map(|raw| declared::certificate(source, raw))
         .transpose()?;
-    let board = match kind {
-        BoardKind::Chessboard => chessboard(source, line, &raw, certificate.as_ref())?,
-        BoardKind::Points => {
-            check_no_keys(source, &raw, kind)?;
-            BoardSpec::points(Vec::new())
+    let expansion_ppm = certificate.as_ref().and_then(Certificate::expansion_ppm);
+    let reader = Reader {
+        source,
+        line,
+        raw: &raw,
+        kind,
+        scale: 1.0 + 1e-6 * expansion_ppm.unwrap_or(0.0),
+    };
+    let (kind, board) = match kind {
+        "charuco" => reader.charuco()?,
+        "aprilgrid" => reader.april_grid()?,
+        "circles" => reader.circles()?,
+        "rings" => reader.rings()?,
+        "points" => (BoardKind::Points, BoardSpec::points(Vec::new())),
+        _ => {
+            let board = chessboard(source, line, &raw, certificate.as_ref())?;
+            (reader.chessboard(&board)?, board)
         }
     };
     Ok(Declared {
@@ -47,11 +61,14 @@ pub(super) fn declared(
     })
 }
 
-fn kind(source: &Source, raw: &RawBoard) -> Result<BoardKind, ManifestError> {
+fn kind(source: &Source, raw: &RawBoard) -> Result<&'static str, ManifestError> {
     let Some(kind) = &raw.kind else {
-        return Ok(BoardKind::Chessboard);
+        return Ok(BoardKind::WORDS[0]);
     };
-    BoardKind::from_word(kind.get_ref()).ok_or_else(|| ManifestError::BoardKind {
+    let known = BoardKind::WORDS
+        .into_iter()
+        .find(|word| word == kind.get_ref());
+    known.ok_or_else(|| ManifestError::BoardKind {
         file: source.file.clone(),
         line: source.line_of(kind),
         kind: kind.get_ref().clone(),
@@ -116,21 +133,80 @@ fn length_mm(
     })
 }
 
-/// Points bring their places along: nothing about a grid can be meant.
-fn check_no_keys(source: &Source, raw: &RawBoard, kind: BoardKind) -> Result<(), ManifestError> {
-    let counts = [("rows", &raw.rows), ("cols", &raw.cols)];
-    let counts = counts
-        .into_iter()
-        .filter_map(|(key, value)| Some((key, source.line_of(value.as_ref()?))));
-    let square = raw.square_mm.iter();
-    let square = square.map(|value| ("square_mm", source.line_of(value)));
-    match counts.chain(square).next() {
-        None => Ok(()),
-        Some((key, line)) => Err(ManifestError::BoardKey {
-            file: source.file.clone(),
-            line,
-            key,
-            kind: kind.word(),
-        }),
+/// The keys that a kind takes.
+fn keys_of(kind: &str) -> &'static [&'static str] {
+    match kind {
+        "charuco" => &[
+            "rows",
+            "cols",
+            "square_mm",
+            "marker_mm",
+            "dictionary",
+            "legacy",
+            "first_id",
+        ],
+        "aprilgrid" => &["rows", "cols", "tag_mm", "spacing", "family", "first_id"],
+        "circles" => &[
+            "rows",
+            "cols",
+            "pitch_mm",
+            "diameter_mm",
+            "asymmetric",
+            "direction",
+        ],
+        "rings" => &[
+            "rows",
+            "cols",
+            "pitch_mm",
+            "outer_radius_mm",
+            "direction_outer_radius_mm",
+            "direction",
+        ],
+        // Points bring their places along: nothing about a grid can be meant.
+        "points" => &[],
+        _ => &["rows", "cols", "square_mm", "marked"],
     }
+}
+
+fn check_keys(source: &Source, raw: &RawBoard, kind: &'static str) -> Result<(), ManifestError> {
+    fn line<T>(source: &Source, value: Option<&Spanned<T>>) -> Option<usize> {
+        value.map(|value| source.line_of(value))
+    }
+    let written = [
+        ("rows", line(source, raw.rows.as_ref())),
+        ("cols", line(source, raw.cols.as_ref())),
+        ("square_mm", line(source, raw.square_mm.as_ref())),
+        ("marked", line(source, raw.marked.as_ref())),
+        ("marker_mm", line(source, raw.marker_mm.as_ref())),
+        ("dictionary", line(source, raw.dictionary.as_ref())),
+        ("legacy", line(source, raw.legacy.as_ref())),
+        ("first_id", line(source, raw.first_id.as_ref())),
+        ("tag_mm", line(source, raw.tag_mm.as_ref())),
+        ("spacing", line(source, raw.spacing.as_ref())),
+        ("family", line(source, raw.family.as_ref())),
+        ("pitch_mm", line(source, raw.pitch_mm.as_ref())),
+        ("diameter_mm", line(source, raw.diameter_mm.as_ref())),
+        ("asymmetric", line(source, raw.asymmetric.as_ref())),
+        ("direction", line(source, raw.direction.as_ref())),
+        (
+            "outer_radius_mm",
+            line(source, raw.outer_radius_mm.as_ref()),
+        ),
+        (
+            "direction_outer_radius_mm",
+            line(source, raw.direction_outer_radius_mm.as_ref()),
+        ),
+    ];
+    let known = keys_of(kind);
+    for (key, line) in written {
+        if let (Some(line), false) = (line, known.contains(&key)) {
+            return Err(ManifestError::BoardKey {
+                file: source.file.clone(),
+                line,
+                key,
+                kind,
+            });
+        }
+    }
+    Ok(())
 }

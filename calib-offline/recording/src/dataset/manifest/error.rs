@@ -1,5 +1,6 @@
 //! What can be wrong with `dataset.toml`, where, and what to do about it.
 
+use super::board_problem::BoardProblem;
 use super::limits::MAX_CAMERAS;
 use super::target_problem::TargetProblem;
 use crate::dataset::known_poses::KnownPosesError;
@@ -98,6 +99,16 @@ pub enum ManifestError {
         line: usize,
         /// The kind.
         kind: String,
+    },
+    /// A printed target that cannot be meant.
+    #[error("{}:{line}: {problem}", file.display())]
+    Board {
+        /// The manifest.
+        file: PathBuf,
+        /// From 1.
+        line: usize,
+        /// What is wrong.
+        problem: BoardProblem,
     },
     /// A key that this kind of target does not take.
     #[error("{}:{line}: [board] {key} means nothing with kind = \"{kind}\"", file.display())]
@@ -366,7 +377,7 @@ impl Remedy for ManifestError {
             Self::Read { .. } | Self::ImageFolder { .. } => "check the path and the permissions",
             Self::NotText { .. } => "save the manifest as UTF-8 text",
             Self::Syntax { .. } => {
-                "correct the line; the keys are [dataset] exclude; [board] kind, rows, cols, square_mm; [board.certificate] scale_ppm_sd, flatness_mm_sd, expansion_ppm_per_k, expansion_ppm_per_k_sd, calibrated_at_c, used_at_c, used_at_c_sd; [[camera]] name, width, height, images or image_list, target_images, optics, serial; [recording] name, by, date; [stage] angles_deg, placement; [poses] known; [target] kind, rows, cols, pitch_mm, outer_radius_mm, direction_outer_radius_mm, direction"
+                "correct the line; the keys are [dataset] exclude; [board] kind, rows, cols, square_mm, marked, marker_mm, dictionary, legacy, first_id, tag_mm, spacing, family, pitch_mm, diameter_mm, asymmetric, direction, outer_radius_mm, direction_outer_radius_mm; [board.certificate] scale_ppm_sd, flatness_mm_sd, expansion_ppm_per_k, expansion_ppm_per_k_sd, calibrated_at_c, used_at_c, used_at_c_sd; [[camera]] name, width, height, images or image_list, target_images, optics, serial; [recording] name, by, date; [stage] angles_deg, placement; [poses] known; [target] kind, rows, cols, pitch_mm, outer_radius_mm, direction_outer_radius_mm, direction"
             }
             Self::Missing { .. } => {
                 "add it; rows and cols count inner corners, width and height are pixels"
@@ -380,9 +391,10 @@ impl Remedy for ManifestError {
             Self::BoardKind { .. } => {
                 return Some(format!(
                     "write kind = \"{}\"",
-                    BoardKind::ALL.map(BoardKind::word).join("\" or \"")
+                    BoardKind::WORDS.join("\" or \"")
                 ));
             }
+            Self::Board { problem, .. } => return Some(problem.remedy()),
             Self::BoardKey { .. } => "remove the key, or write the kind that was meant",
             Self::CameraName { .. } => {
                 "use up to 64 letters, digits, '-', '_' and '.'; the name becomes part of CSV headers such as u_left"

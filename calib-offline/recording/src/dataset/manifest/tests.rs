@@ -148,8 +148,8 @@ fn board_sizes_that_cannot_be() {
         &["dataset.toml:1:", "[board] rows is missing"],
     );
     assert_says(
-        &refused_with("chessboard", "charuco"),
-        &["dataset.toml:2:", "charuco", "kind = \"chessboard\""],
+        &refused_with("chessboard", "checkers"),
+        &["dataset.toml:2:", "checkers", "kind = \"chessboard\""],
     );
 }
 
@@ -321,4 +321,73 @@ fn what_is_declared_is_read_and_checked() {
         &["unknown variant", "mirror"],
     );
     assert_says(&with("scale_ppm_sd", "scale_sd"), &["unknown field"]);
+}
+
+fn with_board(board: &str) -> String {
+    format!("[board]\n{board}\n{}", camera("left"))
+}
+
+#[test]
+fn printed_targets_are_read_with_their_places() {
+    let read = |board: &str| {
+        let folder = folder(&with_board(board));
+        let dataset = Dataset::load(folder.path()).unwrap();
+        (dataset.kind, dataset.board)
+    };
+    let (kind, board) =
+        read("kind = \"aprilgrid\"\nrows = 2\ncols = 3\ntag_mm = 40\nspacing = 0.25\nfirst_id = 4");
+    assert!(matches!(kind, BoardKind::AprilGrid(grid) if grid.first_id == 4));
+    assert_eq!((board.rows, board.cols), (4, 6));
+    let place = board.corner_in_board(3, 2);
+    assert_eq!((place.x, place.y, place.z), (50.0, 90.0, 0.0));
+    assert_eq!(board.extent_mm(), (140.0, 90.0));
+    let (_, board) = read(
+        "kind = \"circles\"\nrows = 5\ncols = 4\npitch_mm = 7\ndiameter_mm = 5\nasymmetric = true",
+    );
+    let place = board.corner_in_board(1, 2);
+    assert_eq!((place.x, place.y), (35.0, 7.0));
+    // As warm as it was: 100 ppm longer.
+    let (kind, board) = read(
+        "kind = \"charuco\"\nrows = 5\ncols = 4\nsquare_mm = 20\nmarker_mm = 15\ndictionary = \"DICT_4X4_50\"\n\
+         [board.certificate]\nexpansion_ppm_per_k = 10\ncalibrated_at_c = 20\nused_at_c = 30",
+    );
+    assert!(matches!(kind, BoardKind::Charuco(board) if board.marker_mm == 15.0015));
+    assert_eq!(board.square_mm, 20.002);
+    let (kind, _) = read(
+        "kind = \"chessboard\"\nrows = 5\ncols = 7\nsquare_mm = 20\nmarked = [[0, 0], [5, 7]]",
+    );
+    assert_eq!(kind, BoardKind::MarkedChessboard(vec![(0, 0), (5, 7)]));
+}
+
+#[test]
+fn printed_targets_that_cannot_be() {
+    let says = |board: &str, parts: &[&str]| assert_says(&refused(&with_board(board)), parts);
+    let charuco = "kind = \"charuco\"\nrows = 5\ncols = 4\nsquare_mm = 20\n";
+    says(charuco, &["marker_mm", "missing"]);
+    says(
+        &format!("{charuco}marker_mm = 20\ndictionary = \"DICT_4X4_50\""),
+        &["marker_mm = 20", "square_mm = 20"],
+    );
+    says(
+        &format!("{charuco}marker_mm = 15\ndictionary = \"4X4\""),
+        &["\"4X4\""],
+    );
+    // 30 squares have 15 markers.
+    says(
+        &format!("{charuco}marker_mm = 15\ndictionary = \"DICT_4X4_50\"\nfirst_id = 36"),
+        &["36 to 50", "DICT_4X4_50 ends at 49"],
+    );
+    says(
+        &format!("{charuco}marker_mm = 15\ndictionary = \"DICT_4X4_50\"\nspacing = 0.3"),
+        &["spacing", "charuco"],
+    );
+    let circles = "kind = \"circles\"\nrows = 5\ncols = 4\npitch_mm = 7\n";
+    says(&format!("{circles}diameter_mm = 8"), &["diameter_mm = 8"]);
+    says(
+        &format!("{circles}diameter_mm = 5\ndirection = [[5, 0]]"),
+        &["[5, 0]", "5 rows"],
+    );
+    let tags = "kind = \"aprilgrid\"\nrows = 5\ncols = 4\ntag_mm = 7\n";
+    says(tags, &["spacing", "missing"]);
+    says(&format!("{tags}spacing = 3"), &["spacing = 3"]);
 }

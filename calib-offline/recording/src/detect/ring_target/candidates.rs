@@ -31,7 +31,7 @@ pub struct RingGuess {
     pub center: Vector2<f64>,
     /// Symmetric; maps the unit circle to the outline (about its middle), px.
     pub shape: Matrix2<f64>,
-    /// Inner against outer radius.
+    /// Inner against outer radius; 0 is a disk.
     pub ratio: f64,
     /// Darker or brighter than around.
     pub polarity: Polarity,
@@ -44,9 +44,28 @@ impl RingGuess {
     }
 }
 
+/// What is looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sought {
+    /// Areas with a hole.
+    Rings,
+    /// Areas with a hole or without.
+    RingsAndDisks,
+}
+
 /// What may be rings, at most `max_count` of either polarity, in the order in which they come in the
 /// image. Stops looking through finer and coarser windows once `enough` of one polarity were found.
 pub fn ring_candidates(image: &GrayImage, enough: usize, max_count: usize) -> Vec<RingGuess> {
+    candidates(image, Sought::Rings, enough, max_count)
+}
+
+/// As [`ring_candidates`], disks included where they are sought.
+pub fn candidates(
+    image: &GrayImage,
+    sought: Sought,
+    enough: usize,
+    max_count: usize,
+) -> Vec<RingGuess> {
     let [dark, bright] = image.quantiles([0.005, 0.995]);
     let margin = MIN_MARGIN * f64::from(bright - dark);
     if margin <= 0.0 {
@@ -63,7 +82,7 @@ pub fn ring_candidates(image: &GrayImage, enough: usize, max_count: usize) -> Ve
             .zip(&mut found)
         {
             let mask = standing_out(image, &means, half_window, margin, polarity);
-            for ring in rings(&areas(&mask, width), polarity) {
+            for ring in rings(&areas(&mask, width), polarity, sought) {
                 let is_new = known
                     .iter()
                     .all(|other| (other.center - ring.center).norm() > 0.5 * ring.mean_radius_px());
@@ -79,7 +98,7 @@ pub fn ring_candidates(image: &GrayImage, enough: usize, max_count: usize) -> Ve
     found.into_iter().flatten().collect()
 }
 
-fn rings(areas: &[Area], polarity: Polarity) -> Vec<RingGuess> {
+fn rings(areas: &[Area], polarity: Polarity, sought: Sought) -> Vec<RingGuess> {
     // Of each area: its largest hole, and all pixels of its holes.
     let mut holes: Vec<(Option<Moments>, Moments)> = vec![Default::default(); areas.len()];
     for area in areas.iter().filter(|area| !area.stands_out) {
@@ -94,8 +113,32 @@ fn rings(areas: &[Area], polarity: Polarity) -> Vec<RingGuess> {
         .iter()
         .zip(holes)
         .filter(|(area, _)| area.stands_out && !area.at_edge)
-        .filter_map(|(area, (hole, all))| ring(&area.moments, &hole?, &all, polarity))
+        .filter_map(|(area, (hole, all))| {
+            let as_ring = hole.and_then(|hole| ring(&area.moments, &hole, &all, polarity));
+            as_ring.or_else(|| {
+                let sought = sought == Sought::RingsAndDisks;
+                sought
+                    .then(|| disk(&area.moments, &all, polarity))
+                    .flatten()
+            })
+        })
         .collect()
+}
+
+/// A disk, with no more than specks in it.
+fn disk(own: &Moments, holes: &Moments, polarity: Polarity) -> Option<RingGuess> {
+    let filled = own.and(holes);
+    if filled.count < MIN_PIXELS || holes.count > MAX_SPECKS * own.count {
+        return None;
+    }
+    let shape = ellipse(&filled, OUTLINE_TOLERANCE)?;
+    let axes = shape.symmetric_eigenvalues();
+    (axes.max() <= MAX_ELONGATION * axes.min()).then_some(RingGuess {
+        center: filled.center(),
+        shape,
+        ratio: 0.0,
+        polarity,
+    })
 }
 
 fn ring(own: &Moments, hole: &Moments, holes: &Moments, polarity: Polarity) -> Option<RingGuess> {

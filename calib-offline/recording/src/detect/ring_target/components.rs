@@ -115,7 +115,7 @@ impl BoxMeans {
     }
 
     /// The mean over the pixels at most `half` away along u and along v, as far as there are any.
-    fn mean(&self, u: usize, v: usize, half: usize) -> f64 {
+    pub fn mean(&self, u: usize, v: usize, half: usize) -> f64 {
         let (left, right) = (u.saturating_sub(half), (u + half + 1).min(self.width));
         let (top, bottom) = (v.saturating_sub(half), (v + half + 1).min(self.height));
         let at = |u: usize, v: usize| self.sums[v * (self.width + 1) + u];
@@ -126,6 +126,11 @@ impl BoxMeans {
 
 /// All areas of a mask of `width` pixels per row, in the order of their first pixels.
 pub fn areas(mask: &[bool], width: usize) -> Vec<Area> {
+    labelled_areas(mask, width).0
+}
+
+/// As [`areas`], with the index of each pixel's area.
+pub fn labelled_areas(mask: &[bool], width: usize) -> (Vec<Area>, Vec<u32>) {
     const NONE: u32 = u32::MAX;
     let height = mask.len() / width.max(1);
     let mut labels = vec![NONE; mask.len()];
@@ -190,7 +195,7 @@ pub fn areas(mask: &[bool], width: usize) -> Vec<Area> {
         }
         areas.push(area);
     }
-    areas
+    (areas, labels)
 }
 
 #[cfg(test)]

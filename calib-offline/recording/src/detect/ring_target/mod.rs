@@ -17,6 +17,7 @@ pub mod join;
 pub mod local_map;
 pub mod locate;
 pub mod located;
+pub mod markers;
 pub mod overlay;
 pub mod perspective;
 pub mod placement;

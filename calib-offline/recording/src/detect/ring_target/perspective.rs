@@ -23,7 +23,7 @@ const POINTS: usize = 24;
 /// Newton steps; each squares what is left.
 const ROUNDS: usize = 3;
 
-/// The offsets of both edges of a ring at `grid`; radii in pitches. `None` if the map is not
+/// The offsets of both edges of a ring at `grid`; radii in pitches, the inner one 0 of a disk. `None` if the map is not
 /// regular there.
 pub fn edge_offsets(
     map: &LocalMap,
@@ -33,7 +33,11 @@ pub fn edge_offsets(
 ) -> Option<EdgeOffsets> {
     Some(EdgeOffsets {
         outer: middle_offset(map, grid, outer_radius)?,
-        inner: middle_offset(map, grid, inner_radius)?,
+        inner: if inner_radius > 0.0 {
+            middle_offset(map, grid, inner_radius)?
+        } else {
+            Vector2::zeros()
+        },
     })
 }
 

@@ -10,7 +10,8 @@
 //!
 //! Under perspective the center of a circle's image is not the image of its center, and two
 //! concentric circles have images with two centers. [`EdgeOffsets`] says by how much each edge lies
-//! aside, so that the fitted center is the image of the circles' own ([`super::perspective`]).
+//! aside, so that the fitted center is the image of the circles' own ([`super::perspective`]). A disk is a
+//! ring whose ratio is held at zero.
 
 use super::candidates::{RingGuess, square_root};
 use super::components::Polarity;
@@ -55,7 +56,7 @@ pub struct FittedRing {
     pub pixel: PixelPoint,
     /// Symmetric; maps the unit circle to the outer edge, px.
     pub shape: Matrix2<f64>,
-    /// Inner against outer radius.
+    /// Inner against outer radius; 0 of a disk.
     pub ratio: f64,
     /// Standard deviation per axis that the residuals of this fit predict, px.
     pub sigma_px: f64,
@@ -128,7 +129,8 @@ impl FittedRing {
             residual_rms,
         };
         let right_sign = (fitted.contrast < 0.0) == (guess.polarity == Polarity::Dark);
-        let inside = (RATIO_RANGE.0 + 0.01..RATIO_RANGE.1 - 0.01).contains(&fitted.ratio);
+        let inside = guess.ratio == 0.0
+            || (RATIO_RANGE.0 + 0.01..RATIO_RANGE.1 - 0.01).contains(&fitted.ratio);
         let is_ring = right_sign
             && inside
             && residual_rms < MAX_RESIDUAL * fitted.contrast.abs()
@@ -219,7 +221,9 @@ impl Window {
         let band = BAND_PX.max(BAND_BLURS * edges.blur);
         let near = |edge: &Edge, at: &Vector2<f64>| edge.beside(at).depth.abs() <= band;
         let pixels: Vec<_> = pixels_around(image, &edges.center, &edges.shape, reach)?
-            .filter(|(at, _)| near(&edges.outer, at) || near(&edges.inner, at))
+            .filter(|(at, _)| {
+                near(&edges.outer, at) || edges.inner.as_ref().is_some_and(|inner| near(inner, at))
+            })
             .collect();
         (pixels.len() >= MIN_PIXELS).then_some(Self { pixels })
     }
@@ -232,13 +236,18 @@ impl Window {
             most,
             shrink: 0.0,
         };
-        let ranges = [range(BLUR, BLUR_RANGE_PX), range(RATIO, RATIO_RANGE)];
+        // A disk has no second radius: one more equation holds its ratio at zero.
+        let is_disk = start.0[RATIO] == 0.0;
+        let ratio_range = if is_disk { (0.0, 0.0) } else { RATIO_RANGE };
+        let ranges = [range(BLUR, BLUR_RANGE_PX), range(RATIO, ratio_range)];
+        let mut of_ratio = Parameters::zeros();
+        of_ratio[RATIO] = 1.0;
+        let held = is_disk.then_some((0.0, (0.0, of_ratio)));
         let fitted = fit(start.0, &LIMITS, &ranges, |unknowns| {
             let edges = RingModel(*unknowns).edges(offsets)?;
             let pixels = self.pixels.iter();
-            Some(NormalEquations::of(
-                pixels.map(|(at, value)| (*value, edges.value_and_gradient(at))),
-            ))
+            let of_pixels = pixels.map(|(at, value)| (*value, edges.value_and_gradient(at)));
+            Some(NormalEquations::of(of_pixels.chain(held)))
         })?;
         // The shape is kept positive definite: a fit that turned it over found something else.
         let shape = RingModel(fitted.unknowns).shape();

@@ -61,10 +61,10 @@ impl RingModel {
                 center: self.center() + offsets.outer,
                 inverse,
             },
-            inner: Edge {
+            inner: (ratio > 0.0).then(|| Edge {
                 center: self.center() + offsets.inner,
                 inverse: inverse / ratio,
-            },
+            }),
             center: self.center(),
             shape,
             ratio,
@@ -85,6 +85,7 @@ pub(super) struct Edge {
 }
 
 /// A point beside an edge.
+#[derive(Clone, Copy)]
 pub(super) struct Beside {
     /// Distance from the edge, positive inside, to first order, px.
     pub depth: f64,
@@ -111,7 +112,8 @@ impl Edge {
 /// A model, ready to be evaluated at many pixels.
 pub(super) struct RingEdges {
     pub outer: Edge,
-    pub inner: Edge,
+    /// `None` of a disk.
+    pub inner: Option<Edge>,
     pub center: Vector2<f64>,
     pub shape: Matrix2<f64>,
     ratio: f64,
@@ -126,9 +128,14 @@ impl RingEdges {
     /// The model's value at a pixel and its derivatives by the parameters, exact at the edges and
     /// to first order beside them.
     pub fn value_and_gradient(&self, at: &Vector2<f64>) -> (f64, Parameters) {
-        let (outer, inner) = (self.outer.beside(at), self.inner.beside(at));
+        let outer = self.outer.beside(at);
         let (in_outer, by_outer) = blurred_step(outer.depth, self.blur);
-        let (in_inner, by_inner) = blurred_step(inner.depth, self.blur);
+        let inner = self.inner.as_ref().map(|edge| edge.beside(at));
+        let (in_inner, by_inner) = inner
+            .as_ref()
+            .map_or((0.0, 0.0), |inner| blurred_step(inner.depth, self.blur));
+        // Without a hole its derivatives are zero, and any place will do.
+        let inner = inner.unwrap_or(outer);
         let share = in_outer - in_inner;
         let aside = (at - self.center) / self.radius_px;
         let light = 1.0 + self.slope.dot(&aside);
@@ -198,7 +205,7 @@ pub(super) mod tests {
             let circle = Vector2::new(angle.cos(), angle.sin());
             for at in [
                 edges.outer.center + edges.shape * circle,
-                edges.inner.center + edges.shape * circle * 0.5,
+                edges.inner.as_ref().unwrap().center + edges.shape * circle * 0.5,
             ] {
                 let value = |p| {
                     let edges = RingModel(p).edges(&offsets()).unwrap();
