@@ -195,13 +195,24 @@ pub(super) fn came_to_rest(stop: StopReason) -> bool {
     matches!(stop, StopReason::Converged | StopReason::NoFurtherDecrease)
 }
 
-/// Noise that residuals show, and how much each counts: as in the joint estimate.
+/// Noise that residuals show, and how much each counts: as in the joint estimate, but for the corners far from
+/// all others, which take no part. What a model leaves that does not fit has tails of its own.
 pub(super) fn weighted(
     residuals: &[Vec<Option<Vector2<f64>>>],
     observations: &Observations,
 ) -> (StudentT, Vec<Vec<f64>>) {
     let (noise, _) = reweight(residuals, observations, 1.0, None, false);
-    (noise, relative_weights(residuals, observations, &noise))
+    let mut weights = relative_weights(residuals, observations, &noise);
+    let views = weights.iter_mut().zip(residuals).zip(&observations.views);
+    for ((weights, residuals), view) in views {
+        for ((weight, residual), corner) in weights.iter_mut().zip(residuals).zip(&view.corners) {
+            let squared = residual.map(|r| r.norm_squared() * corner.relative_weight);
+            if squared.is_some_and(|squared| !noise.is_near(squared)) {
+                *weight = 0.0;
+            }
+        }
+    }
+    (noise, weights)
 }
 
 /// Which weights are above 0.

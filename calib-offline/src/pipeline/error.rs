@@ -78,7 +78,10 @@ impl CalibrateError {
     pub fn is_undetermined(&self) -> bool {
         match self {
             Self::Corners(_) | Self::Exclude(_) | Self::Known(_) => false,
-            Self::Detect(error) => matches!(error, DetectError::Consistency(_)),
+            Self::Detect(error) => matches!(
+                error,
+                DetectError::Consistency(_) | DetectError::WrongCount { .. }
+            ),
             Self::Task(error) => error.is_undetermined(),
             Self::Sufficiency(_)
             | Self::FewImages { .. }

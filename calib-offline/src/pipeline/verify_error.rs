@@ -62,7 +62,9 @@ fn words(board: &BoardSpec) -> String {
     let (rows, cols, square_mm) = (board.rows, board.cols, board.square_mm);
     match board.layout {
         Layout::Points(_) => format!("{cols} points"),
-        Layout::Grid | Layout::Face(_) => format!("{rows} x {cols} corners and {square_mm} mm squares"),
+        Layout::Grid | Layout::Face(_) => {
+            format!("{rows} x {cols} corners and {square_mm} mm squares")
+        }
     }
 }
 

@@ -75,14 +75,16 @@ fn a_file_that_is_no_image_of_its_camera() {
         (&good[..good.len() / 2], "1.png"),
         (&good[..20], "1.png"),
         (&huge, "1.png"),
-        (&small, "is 1x1 pixels, but the manifest says 640x480"),
+        (&small, "(1.png): 1x1 pixels, not 640x480"),
         (&turned, "width and height swapped?"),
     ];
     for (bytes, words) in cases {
         fs::write(path.join("set/left/1.png"), bytes).unwrap();
         refused(path, 2, &["camera left, pose 1", words]);
     }
-    fs::write(path.join("set/right/0.png"), b"").unwrap();
+    for broken in ["set/left/1.png", "set/right/0.png"] {
+        fs::write(path.join(broken), b"").unwrap();
+    }
     refused(path, 2, &["camera left, pose 1", "1 more images"]);
 }
 
@@ -99,8 +101,7 @@ fn images_without_the_board_that_is_described() {
     run(path, &["calibrate", "set", "-o", "out"])
         .assert_code(3)
         .assert_says(&[
-            "8 of 8 images",
-            "left/0.png",
+            "8 of 8 images show a whole board of 5 x 6",
             "rows = 6, cols = 5",
             "not squares",
         ]);

@@ -34,8 +34,7 @@ impl StudentT {
     /// Weight of a residual whose squared length is `squared_px2`, and 0 where an outlier is likelier: with light
     /// tails beyond a few standard deviations, with heavy ones, which real images have, many times further out.
     pub fn weight(&self, squared_px2: f64) -> f64 {
-        let is_near = squared_px2 <= KEEP_WITHIN_SIGMA * KEEP_WITHIN_SIGMA * self.variance_px2;
-        if is_near
+        if self.is_near(squared_px2)
             || self.log_density_of_corners(squared_px2) >= LN_OUTLIER_DENSITY + LN_OUTLIER_SHARE
         {
             self.tail_weight(squared_px2)
@@ -44,7 +43,12 @@ impl StudentT {
         }
     }
 
-    /// The same without a rejection limit: the pull of a residual falls with its length and never ends.
+    /// Whether a residual is within eight times the scale.
+    pub fn is_near(&self, squared_px2: f64) -> bool {
+        squared_px2 <= KEEP_WITHIN_SIGMA * KEEP_WITHIN_SIGMA * self.variance_px2
+    }
+
+    /// [`Self::weight`] without a rejection limit: the pull of a residual falls with its length and never ends.
     pub fn tail_weight(&self, squared_px2: f64) -> f64 {
         (self.freedom + 2.0) / (self.freedom + squared_px2 / self.variance_px2)
     }
