@@ -77,7 +77,7 @@ pub enum Verb {
     /// Make a dataset with known truth
     #[command(before_help = SIMULATE_EXAMPLE, after_help = SIMULATE_FORMATS)]
     Simulate(simulate::SimulateArgs),
-    /// Draw a calibration target to print, with its [board]
+    /// Draw a calibration target to print, with its description
     Target(target::TargetArgs),
     /// Say whether an old calibration still holds, by a few new poses, and what changed
     Verify(verify::VerifyArgs),

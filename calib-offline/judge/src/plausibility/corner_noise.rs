@@ -6,6 +6,7 @@ use super::look::Look;
 use crate::cause::{Cause, Code};
 use crate::verdict::Grade;
 use calib_estimate::adjust::observations::ViewBlock;
+use calib_rays::board::BoardSpec;
 use calib_rays::numerics::median;
 use std::collections::BTreeMap;
 
@@ -21,6 +22,8 @@ const MEDIAN_SHARE: f64 = 0.6745;
 const WRONG_SIGMA: f64 = 8.0;
 /// A larger share of wrong corners says that something is wrong with how they are found.
 const MANY_WRONG: f64 = 0.03;
+/// Labels whose steps along a row differ by less than this part of one are evenly spaced.
+const EVEN: f64 = 1e-6;
 /// Fewer differences than this say nothing of a camera.
 const LEAST: usize = 30;
 
@@ -31,7 +34,7 @@ pub fn noise_and_outliers(look: &Look<'_>, error_mm_per_px: Option<f64>) -> Vec<
         let views = look.observations.views.iter();
         let differences: Vec<[f64; 2]> = views
             .filter(|view| view.camera_idx == camera_idx)
-            .flat_map(differences)
+            .flat_map(|view| differences(view, &look.dataset.board))
             .collect();
         if differences.len() < LEAST {
             continue;
@@ -81,24 +84,33 @@ pub fn noise_and_outliers(look: &Look<'_>, error_mm_per_px: Option<f64>) -> Vec<
     causes
 }
 
-/// Fourth differences of u and v along the rows of a view, px.
-fn differences(view: &ViewBlock) -> Vec<[f64; 2]> {
+/// Fourth differences of u and v along the rows of a view, px: of neighbors, or where the print is not even, of every
+/// second label, as on tags with gaps between them.
+fn differences(view: &ViewBlock, board: &BoardSpec) -> Vec<[f64; 2]> {
     let mut rows: BTreeMap<usize, BTreeMap<usize, [f64; 2]>> = BTreeMap::new();
     for corner in &view.corners {
         let row = rows.entry(corner.row).or_default();
         row.insert(corner.col, [corner.pixel.u, corner.pixel.v]);
     }
-    rows.values()
-        .flat_map(|row| {
-            row.keys().filter_map(|col| {
-                let mut sum = [0.0; 2];
-                for (k, weight) in FOURTH.iter().enumerate() {
-                    let pixel = row.get(&(col + k))?;
-                    sum[0] += weight * pixel[0];
-                    sum[1] += weight * pixel[1];
-                }
-                Some(sum)
-            })
-        })
+    let even = |row: usize, cols: &[usize; FOURTH.len()]| {
+        let at = cols.map(|col| board.corner_in_board(row, col));
+        let bend = |k: usize| (at[k - 1] - at[k] * 2.0 + at[k + 1]).norm();
+        (1..FOURTH.len() - 1).all(|k| bend(k) < EVEN * (at[1] - at[0]).norm())
+    };
+    let of = |row: usize, pixels: &BTreeMap<usize, [f64; 2]>, first: usize| {
+        let cols = [1, 2]
+            .map(|step| std::array::from_fn(|k| first + k * step))
+            .into_iter()
+            .find(|cols| cols.iter().all(|col| pixels.contains_key(col)) && even(row, cols))?;
+        let mut sum = [0.0; 2];
+        for (col, weight) in cols.iter().zip(FOURTH) {
+            let pixel = pixels.get(col)?;
+            sum[0] += weight * pixel[0];
+            sum[1] += weight * pixel[1];
+        }
+        Some(sum)
+    };
+    rows.iter()
+        .flat_map(|(row, pixels)| pixels.keys().filter_map(|col| of(*row, pixels, *col)))
         .collect()
 }

@@ -76,7 +76,9 @@ impl ChessboardDetector for ChessTopologicalDetector {
         let [mut best, half, quarter] = found;
         take_larger(&mut best, half, board);
         take_larger(&mut best, quarter, board);
-        if 2 * largest(&best, board) < board.corner_count()
+        // Squares of less than eight pixels in an image that large are a thousandth of its width.
+        if pixels <= 16 * LARGE_PIXELS
+            && 2 * largest(&best, board) < board.corner_count()
             && let Some(double) = image.doubled()
         {
             take_larger(&mut best, detect_at(&double, Scale::DOUBLE), board);

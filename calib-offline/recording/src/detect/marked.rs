@@ -3,7 +3,7 @@
 use super::chessboard::RawCorner;
 use super::grid::Node;
 use super::labelling::Placement;
-use super::printed::charuco::Part;
+use super::printed::charuco_parts::Part;
 use super::printed::homography::Homography;
 use crate::dataset::image::GrayImage;
 use calib_rays::print::chessboard::DOT;

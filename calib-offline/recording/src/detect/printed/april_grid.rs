@@ -5,10 +5,10 @@
 //! corners of the tags are then fitted as crossings with the small squares between the tags.
 
 use super::cells::{Placed, read};
+use super::found::{Found, PrintedTarget};
 use super::homography::Homography;
 use super::quads::quads;
 use super::saddles::{self, Crossing, Crossings, Label};
-use super::{Found, PrintedTarget};
 use crate::dataset::image::GrayImage;
 use crate::detect::seen_board::SeenBoard;
 use crate::detect::settings::DetectSettings;

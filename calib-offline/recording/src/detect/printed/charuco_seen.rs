@@ -1,7 +1,7 @@
 //! What board an image shows instead of the one that is described.
 
 use super::cells::Placed;
-use super::charuco::{Part, ReadCell, Votes, exact_markers};
+use super::charuco_parts::{Part, ReadCell, Votes, exact_markers};
 use crate::dataset::image::GrayImage;
 use crate::detect::chessboard::RawCorner;
 use crate::detect::seen_board::SeenBoard;

@@ -6,8 +6,8 @@
 //! with a hole, or clearly larger or smaller than most. A grid that looks the same after a turn gets the
 //! numbering whose columns count to the right in the image, or nearest to it.
 
+use super::found::{Found, PrintedTarget, quarter_turns};
 use super::smooth::keep_smooth;
-use super::{Found, PrintedTarget, quarter_turns};
 use crate::dataset::image::GrayImage;
 use crate::detect::illegible::EDGE_WIDTH_OF_BLUR;
 use crate::detect::ring_target::candidates::Sought;

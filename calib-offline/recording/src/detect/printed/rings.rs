@@ -1,6 +1,6 @@
 //! The target of rings, as a board.
 
-use super::{Found, PrintedTarget};
+use super::found::{Found, PrintedTarget};
 use crate::dataset::TargetSpec;
 use crate::dataset::image::GrayImage;
 use crate::detect::ring_target::{TargetFigures, TargetSettings, locate};

@@ -5,6 +5,7 @@
 //! that does not belong to the crossing is covered as far as the blur carries it, and the windows
 //! reach as far as the edges do; then once more for corners that only the better map predicts.
 
+pub use super::smooth::Label;
 use super::smooth::keep_smooth;
 use crate::dataset::image::GrayImage;
 use crate::detect::corner_fit::{CornerGuess, FittedCorner, fit_corner};
@@ -13,9 +14,6 @@ use calib_rays::geometry::PixelPoint;
 use calib_rays::numerics::median;
 use nalgebra::Vector2;
 use std::collections::BTreeMap;
-
-/// Row and column.
-pub type Label = (usize, usize);
 
 /// A crossing that the target has.
 #[derive(Debug, Clone, Copy, PartialEq)]

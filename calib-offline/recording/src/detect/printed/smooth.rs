@@ -1,10 +1,12 @@
 //! Points that lie aside of where all others have them.
 
-use super::saddles::Label;
 use crate::detect::ring_target::local_map::LocalMap;
 use calib_rays::numerics::median;
 use nalgebra::Vector2;
 use std::collections::BTreeMap;
+
+/// Row and column.
+pub type Label = (usize, usize);
 
 /// Points farther from the map through all than this many times the median distance ...
 const MAX_ASIDE: f64 = 7.0;

@@ -4,7 +4,7 @@
 //! pose to pose the numbering follows the pose before, and in a pose that several cameras see, the first
 //! camera that sees it: cameras stand the same way up, or nearly so.
 
-use super::{Found, PrintedTarget, quarter_turns};
+use super::found::{Found, PrintedTarget, quarter_turns};
 use crate::dataset::Dataset;
 use crate::dataset::target::turned;
 use crate::detect::job::Job;
