@@ -4,3 +4,4 @@
 pub mod export;
 pub mod matches;
 pub mod pack;
+pub mod rays;

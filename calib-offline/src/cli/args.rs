@@ -3,7 +3,7 @@
 use super::settings::CommonArgs;
 use super::{
     calibrate, compare, demo, detect, device, evaluate, export, flash, inspect, measure, methods,
-    pack, simulate, target, verify,
+    pack, rays, simulate, target, verify,
 };
 use clap::{Parser, Subcommand};
 
@@ -62,7 +62,7 @@ pub enum Verb {
     Device(device::DeviceArgs),
     /// Run the publication's experiments with three methods: figures, tables, evaluation.json
     Evaluate(evaluate::EvaluateArgs),
-    /// Write a blob as Intel HEX, UF2, raw bytes or a C array
+    /// Write a blob for a flash tool or a compiler, or a rig for another tool
     Export(export::ExportArgs),
     /// Send a blob to a device
     Flash(flash::FlashArgs),
@@ -74,6 +74,8 @@ pub enum Verb {
     Methods(methods::MethodsArgs),
     /// Pack a calibration for the device within a proven error
     Pack(pack::PackArgs),
+    /// Look up the rays of single pixels
+    Rays(rays::RaysArgs),
     /// Make a dataset with known truth
     #[command(before_help = SIMULATE_EXAMPLE, after_help = SIMULATE_FORMATS)]
     Simulate(simulate::SimulateArgs),

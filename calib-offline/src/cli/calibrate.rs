@@ -7,6 +7,7 @@ use super::match_noise::parse;
 use super::output::Console;
 use super::place::check_results_folder;
 use super::usage_error::UsageError;
+use crate::exchange::dense::array_name;
 use crate::methods::{self, Method};
 use crate::pipeline::{CalibrateError, CalibrateSettings, Calibrated};
 use crate::report::facts::Facts;
@@ -174,7 +175,7 @@ pub fn run(
         let names: Vec<String> = dataset
             .cameras
             .iter()
-            .map(|c| table_name(&c.name))
+            .map(|c| array_name(&c.name))
             .collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         check_results_folder(&args.output, &names, args.force)?;
@@ -247,11 +248,6 @@ pub fn calibrate_into(
     write_results(folder, calibrated, console)
 }
 
-/// Name of the file with a camera's rays.
-fn table_name(camera: &str) -> String {
-    format!("rays_{camera}.npy")
-}
-
 /// Says so if there are images that nobody looks at.
 pub fn say_what_is_used(dataset: &Dataset, console: &Console) {
     if dataset.corners_path().exists() && dataset.has_images() {
@@ -290,7 +286,7 @@ pub fn write_results(
     let cameras = calibration.rig.cameras.iter();
     let tables: Vec<(PathBuf, Vec<u8>)> = cameras
         .zip(&ray_tables)
-        .map(|(camera, table)| (folder.join(table_name(&camera.name)), table.to_npy()))
+        .map(|(camera, table)| (folder.join(array_name(&camera.name)), table.to_npy()))
         .collect();
     let set: Vec<(PathBuf, &[u8])> = files
         .iter()

@@ -5,10 +5,11 @@ use crate::compare::CompareError;
 use crate::compare::publication::ExperimentError;
 use crate::demo::DemoError;
 use crate::device::DeviceError;
+use crate::exchange::ExchangeError;
 use crate::pipeline::{CalibrateError, VerifyError};
 use crate::report::store::CalibrationError;
 use calib_blob::export::ExportError;
-use calib_blob::matches::{LengthsError, MatchesError, NoiseError};
+use calib_blob::matches::{LengthsError, MatchesError, NoiseError, PixelsError};
 use calib_blob::pack::{BlobError, PackError};
 use calib_rays::remedy::Remedy;
 use calib_recording::atomic_file::WriteError;
@@ -50,6 +51,9 @@ pub enum Error {
     /// Matches that were read.
     #[error("the matches cannot be used")]
     Matches(#[from] MatchesError),
+    /// Pixels that were read.
+    #[error("the pixels cannot be used")]
+    Pixels(#[from] PixelsError),
     /// Gaps that do not say how noisy matches are.
     #[error("the noise of the matches cannot be estimated")]
     Noise(#[from] NoiseError),
@@ -62,6 +66,9 @@ pub enum Error {
     /// A blob that was to be written in another form.
     #[error("the blob cannot be exported")]
     Export(#[from] ExportError),
+    /// A rig that was to be written for another tool.
+    #[error("the rig cannot be exported")]
+    Exchange(#[from] ExchangeError),
     /// A device that did not do what it was asked for.
     #[error("the device cannot be used")]
     Device(#[from] DeviceError),
@@ -160,6 +167,7 @@ impl Error {
             Self::Verify(error) => error.is_undetermined(),
             Self::Target(error) => matches!(error, TargetError::AllRefused { .. }),
             Self::Pack(error) => matches!(error, PackError::NothingCalibrated { .. }),
+            Self::Exchange(error) => matches!(error, ExchangeError::TooFewRays { .. }),
             Self::Noise(error) => !matches!(error, NoiseError::NothingPredicted),
             _ => false,
         };
@@ -183,10 +191,12 @@ impl Remedy for Error {
             Self::Verify(error) => error.remedy(),
             Self::Blob(error) => error.remedy(),
             Self::Matches(error) => error.remedy(),
+            Self::Pixels(error) => error.remedy(),
             Self::Noise(error) => error.remedy(),
             Self::Lengths(error) => error.remedy(),
             Self::Pack(error) => error.remedy(),
             Self::Export(error) => error.remedy(),
+            Self::Exchange(error) => error.remedy(),
             Self::Device(error) => error.remedy(),
             Self::Write(error) => error.remedy(),
             Self::Demo(error) => error.remedy(),

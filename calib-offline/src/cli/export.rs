@@ -1,7 +1,8 @@
-//! `export`: a blob in the form that a flash tool or a compiler takes.
+//! `export`: a blob in the form that a flash tool or a compiler takes, or a rig in the form of another tool.
 
 use super::Outcome;
 use super::error::Error;
+use super::export_folder::{self, FolderForm, LossObject};
 use super::output::Console;
 use super::place::check_file;
 use super::rig_file::{RigFile, open};
@@ -16,27 +17,41 @@ const EXAMPLE: &str = "\
 Example:
   calib-offline export rig.rays -o rig.hex --format hex --base-address 0x08100000
   calib-offline export rig.rays -o rig.uf2 --format uf2 --base-address 0x10100000 --family 0xe48bff56
-  calib-offline export rig.rays -o rig.c --format c --name rig_blob";
+  calib-offline export rig.rays -o rig.c --format c --name rig_blob
+  calib-offline export calibration.json -o opencv --format opencv";
 
 const FORMATS: &str = "\
-The blob is opened first, as a device would. The base address is where it goes in the device's memory: a
+hex, uf2, bin and c take a blob and write one file. The base address is where it goes in the device's memory: a
 multiple of 8, of 256 for uf2, whose last page is filled up with 0xff. The C source defines an
 array, aligned to 8, and its length NAME_len (ray-runtime/c/rays.h opens it). An earlier file of the same
 form is replaced; any other only with --force.
 
+The others take a blob or a calibration.json and write a folder; files in it are replaced only with --force.
+opencv  NAME.yml a camera and extrinsics.yml (R, T: the second camera from the first, mm)
+ros     NAME.yaml a camera (camera_info); where the cameras stand is lost
+kalibr  camchain.yaml, in meters
+npy     rays_NAME.npy a camera, as --ray-tables of calibrate writes them, and rays.json: shapes and units
+The first three hold the pinholes that come nearest to the rays of the calibrated area at the working
+distance, with 5 coefficients, or with 8 where these lose a fifth less (kalibr: 4). What they lose is
+printed and written to FOLDER.loss.json.
+
 With --json, schema calib-offline/export/1:
-  output, format, blob_bytes, file_bytes
-  base_address, family, name    null where the form has none";
+  output, format
+  file_bytes    of all files
+  blob_bytes, base_address, family, name    null where the form has none
+  files    those of a folder; else null
+  loss (rms_px, max_px, rms_mm, max_mm, distance_mm,
+    cameras (name, coefficients, rms_px, max_px, rms_mm, max_mm))    of pinholes; else null";
 
 /// The arguments.
 #[derive(Debug, Args)]
 #[command(before_help = EXAMPLE, after_help = FORMATS)]
 pub struct ExportArgs {
-    /// The blob
-    #[arg(value_name = "RIG.rays")]
+    /// The blob, or a calibration.json for the forms of other tools
+    #[arg(value_name = "RIG")]
     pub rig: PathBuf,
-    /// Where to write it
-    #[arg(short, long, value_name = "FILE")]
+    /// The file or the folder to write
+    #[arg(short, long, value_name = "PATH")]
     pub output: PathBuf,
     /// The form to write
     #[arg(long, value_name = "FORM", value_enum)]
@@ -70,6 +85,18 @@ pub enum FormatArg {
     Bin,
     /// C source
     C,
+    /// `OpenCV`'s `FileStorage`.
+    #[value(name = "opencv", help = "OpenCV's FileStorage, a folder")]
+    OpenCv,
+    /// Kalibr's `camchain.yaml`.
+    #[value(help = "Kalibr's camchain.yaml, a folder")]
+    Kalibr,
+    /// ROS' `camera_info`.
+    #[value(help = "ROS' camera_info, a folder")]
+    Ros,
+    /// The rays themselves.
+    #[value(help = "The ray of every pixel as NumPy arrays, a folder")]
+    Npy,
 }
 
 impl FormatArg {
@@ -79,19 +106,36 @@ impl FormatArg {
             Self::Uf2 => "uf2",
             Self::Bin => "bin",
             Self::C => "c",
+            Self::OpenCv => "opencv",
+            Self::Kalibr => "kalibr",
+            Self::Ros => "ros",
+            Self::Npy => "npy",
         }
     }
 
-    /// How every file of the form begins.
-    const fn start(self) -> &'static [u8] {
+    /// What it takes to write it.
+    const fn kind(self) -> Kind {
         match self {
-            Self::Hex => b":02000004",
-            Self::Uf2 => b"UF2\n",
-            Self::Bin => &ray_runtime::format::MAGIC,
-            Self::C => b"/* A ray blob",
+            Self::Hex => Kind::File(b":02000004"),
+            Self::Uf2 => Kind::File(b"UF2\n"),
+            Self::Bin => Kind::File(&ray_runtime::format::MAGIC),
+            Self::C => Kind::File(b"/* A ray blob"),
+            Self::OpenCv => Kind::Folder(FolderForm::OpenCv),
+            Self::Kalibr => Kind::Folder(FolderForm::Kalibr),
+            Self::Ros => Kind::Folder(FolderForm::Ros),
+            Self::Npy => Kind::Folder(FolderForm::Npy),
         }
     }
 }
+
+/// One file or several.
+enum Kind {
+    /// How every file of the form begins.
+    File(&'static [u8]),
+    Folder(FolderForm),
+}
+
+const SCHEMA: &str = "calib-offline/export/1";
 
 /// What `--json` prints.
 #[derive(Debug, Serialize)]
@@ -99,11 +143,13 @@ struct ExportObject<'a> {
     schema: &'static str,
     output: &'a Path,
     format: &'static str,
-    blob_bytes: usize,
+    blob_bytes: Option<usize>,
     file_bytes: usize,
     base_address: Option<u32>,
     family: Option<u32>,
     name: Option<&'a str>,
+    files: Option<&'a [PathBuf]>,
+    loss: Option<&'a LossObject>,
 }
 
 /// Runs the command.
@@ -111,7 +157,43 @@ struct ExportObject<'a> {
 /// # Errors
 /// [`Error`], with nothing written.
 pub fn run(args: &ExportArgs, console: &Console) -> Result<Outcome, Error> {
-    check_file(&args.output, args.format.start(), &[&args.rig], args.force)?;
+    check_options(args)?;
+    match args.format.kind() {
+        Kind::File(start) => write_file(args, start, console),
+        Kind::Folder(form) => write_folder(args, form, console),
+    }
+}
+
+fn write_folder(args: &ExportArgs, form: FolderForm, console: &Console) -> Result<Outcome, Error> {
+    let written = export_folder::write(&args.rig, form, &args.output, args.force)?;
+    let object = ExportObject {
+        schema: SCHEMA,
+        output: &args.output,
+        format: args.format.name(),
+        blob_bytes: None,
+        file_bytes: written.bytes,
+        base_address: None,
+        family: None,
+        name: None,
+        files: Some(&written.files),
+        loss: written.loss.as_ref(),
+    };
+    let lost = match &written.loss {
+        Some(loss) => format!("; {}", loss.in_words()),
+        None => String::new(),
+    };
+    let words = format!(
+        "{} files of {} written to {}{lost}",
+        written.files.len(),
+        args.format.name(),
+        args.output.display()
+    );
+    console.result(&words, &object);
+    Ok(Outcome::Done)
+}
+
+fn write_file(args: &ExportArgs, start: &[u8], console: &Console) -> Result<Outcome, Error> {
+    check_file(&args.output, start, &[&args.rig], args.force)?;
     let form = form(args)?;
     let RigFile::Blob(bytes) = RigFile::read(&args.rig)? else {
         return Err(Error::Usage(UsageError::UnknownKind {
@@ -123,10 +205,10 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<Outcome, Error> {
     let file = export::file(&bytes, &form)?;
     atomic_file::write(&args.output, &file)?;
     let object = ExportObject {
-        schema: "calib-offline/export/1",
+        schema: SCHEMA,
         output: &args.output,
         format: args.format.name(),
-        blob_bytes: bytes.len(),
+        blob_bytes: Some(bytes.len()),
         file_bytes: file.len(),
         base_address: args.base_address,
         family: args.family,
@@ -134,6 +216,8 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<Outcome, Error> {
             Form::C { name } => Some(name),
             _ => None,
         },
+        files: None,
+        loss: None,
     };
     let place = match (args.base_address, object.name) {
         (Some(first), _) => {
@@ -153,8 +237,8 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<Outcome, Error> {
     Ok(Outcome::Done)
 }
 
-/// The form that the arguments ask for.
-fn form(args: &ExportArgs) -> Result<Form, ExportError> {
+/// Refuses what the form has no place for.
+fn check_options(args: &ExportArgs) -> Result<(), ExportError> {
     let form = args.format.name();
     let is_placed = matches!(args.format, FormatArg::Hex | FormatArg::Uf2);
     let needless = [
@@ -165,9 +249,15 @@ fn form(args: &ExportArgs) -> Result<Form, ExportError> {
         ),
         ("--name", args.name.is_some() && args.format != FormatArg::C),
     ];
-    if let Some((option, _)) = needless.into_iter().find(|(_, is_needless)| *is_needless) {
-        return Err(ExportError::NeedlessOption { form, option });
+    match needless.into_iter().find(|(_, is_needless)| *is_needless) {
+        Some((option, _)) => Err(ExportError::NeedlessOption { form, option }),
+        None => Ok(()),
     }
+}
+
+/// The form of one file that the arguments ask for.
+fn form(args: &ExportArgs) -> Result<Form, ExportError> {
+    let form = args.format.name();
     let base_address = || args.base_address.ok_or(ExportError::NoAddress { form });
     Ok(match args.format {
         FormatArg::Hex => Form::Hex {
@@ -177,10 +267,10 @@ fn form(args: &ExportArgs) -> Result<Form, ExportError> {
             base_address: base_address()?,
             family: args.family,
         },
-        FormatArg::Bin => Form::Binary,
         FormatArg::C => Form::C {
             name: args.name.clone().unwrap_or_else(|| "rays_blob".to_owned()),
         },
+        _ => Form::Binary,
     })
 }
 

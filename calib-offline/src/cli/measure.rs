@@ -204,7 +204,7 @@ fn measure_there(args: &MeasureArgs, address: &str) -> Result<Measured, Error> {
     let client = connect(address, DEFAULT_TIMEOUT)?;
     let noise = args.match_noise_px.and_then(in_f32);
     let mut source = DeviceSource::new(client, address)?.with_noise(noise);
-    let mut input = open_matches(args)?;
+    let mut input = open_matches(args.matches())?;
     let summary = stream(args, &mut input, |file, input, output| {
         measure_batches(&mut source, file, input, output)
     })?;
@@ -307,7 +307,7 @@ fn prepare(
     args: &MeasureArgs,
     estimate: impl FnOnce(&mut dyn Read) -> Result<Result<NoiseEstimate, NoiseError>, MatchesError>,
 ) -> Result<(Box<dyn Read>, NoiseUsed), Error> {
-    let mut input = open_matches(args)?;
+    let mut input = open_matches(args.matches())?;
     if !args.estimate_match_noise {
         let noise = NoiseUsed {
             match_noise_px: args.match_noise_px,
@@ -330,12 +330,16 @@ fn prepare(
     Ok((Box::new(std::io::Cursor::new(bytes)), noise))
 }
 
-fn open_matches(args: &MeasureArgs) -> Result<Box<dyn Read>, MatchesError> {
-    Ok(if args.matches().as_os_str() == "-" {
+/// A list to be read; - is standard input.
+///
+/// # Errors
+/// [`MatchesError::Read`].
+pub(super) fn open_matches(path: &Path) -> Result<Box<dyn Read>, MatchesError> {
+    Ok(if path.as_os_str() == "-" {
         Box::new(std::io::stdin().lock())
     } else {
-        let file = File::open(args.matches()).map_err(|source| MatchesError::Read {
-            file: args.matches().to_owned(),
+        let file = File::open(path).map_err(|source| MatchesError::Read {
+            file: path.to_owned(),
             source,
         })?;
         Box::new(file)

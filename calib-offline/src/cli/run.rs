@@ -7,7 +7,7 @@ use super::output::Console;
 use super::settings::Settings;
 use super::{
     calibrate, compare, demo, device, evaluate, export, failure, flash, inspect, measure, methods,
-    pack, recording, target, verify,
+    pack, rays, recording, target, verify,
 };
 use clap::Parser;
 use std::process::ExitCode;
@@ -46,6 +46,7 @@ fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
         Verb::Measure(args) => measure::run(args, console),
         Verb::Methods(args) => methods::run(args, console),
         Verb::Pack(args) => pack::run(args, console),
+        Verb::Rays(args) => rays::run(args, console),
         Verb::Simulate(args) => recording::simulate(args, console),
         Verb::Target(args) => target::run(args, console),
         Verb::Verify(args) => verify::run(args, console),

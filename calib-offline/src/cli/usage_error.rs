@@ -43,6 +43,14 @@ pub enum UsageError {
         /// The rig's cameras.
         known: Vec<String>,
     },
+    /// A camera that the rig does not have.
+    #[error("--camera: the rig has no camera \"{name}\"; it has {}", known.join(", "))]
+    UnknownCamera {
+        /// The name.
+        name: String,
+        /// The rig's cameras.
+        known: Vec<String>,
+    },
     /// One camera cannot triangulate.
     #[error("{}: has one camera, a point takes two", path.display())]
     OneCamera {
@@ -108,6 +116,7 @@ impl Remedy for UsageError {
             Self::UnknownFrame { .. } => {
                 "leave --frame out for the rig's own frame, or name one of its cameras"
             }
+            Self::UnknownCamera { .. } => "name one of its cameras",
             Self::OneCamera { .. } => {
                 "calibrate two cameras together; a single one gives rays only"
             }

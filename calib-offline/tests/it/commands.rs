@@ -85,6 +85,7 @@ fn every_help_starts_with_an_example() {
         "measure",
         "methods",
         "pack",
+        "rays",
         "simulate",
         "verify",
     ] {

@@ -68,7 +68,13 @@ fn from_a_recording_to_points() {
     assert_documented("pack", "calib-offline/pack/2", &[packed], &[]);
     let export = ["export", "new.rays", "-o", "rig.c", "--format", "c"];
     let exported = json(path, &export);
-    assert_documented("export", "calib-offline/export/1", &[exported], &[]);
+    let export = ["export", "new.rays", "-o", "opencv", "--format", "opencv"];
+    let exported = [exported, json(path, &export)];
+    assert_documented("export", "calib-offline/export/1", &exported, &[]);
+    fs::write(path.join("pixels.csv"), "id,u,v\na,320,240\n").unwrap();
+    let rays = ["rays", "new.rays", "pixels.csv", "--camera", "left"];
+    let looked_up = json(path, &[&rays[..], &["-o", "rays.csv"]].concat());
+    assert_documented("rays", "calib-offline/rays/1", &[looked_up], &[]);
     let measure = ["measure", "new.rays", "matches.csv", "-o", "points.csv"];
     let lengths = ["--lengths", "lengths.csv"];
     let measured = json(path, &[measure.as_slice(), &lengths].concat());

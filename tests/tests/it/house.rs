@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// ARCHITECTURE.md draws them.
 const FLOORS: [&[&str]; 5] = [
     &["present"],
-    &["device", "report"],
+    &["device", "exchange", "report"],
     &["methods"],
     &["pipeline", "compare", "demo"],
     &["cli"],

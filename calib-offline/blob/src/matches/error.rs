@@ -111,6 +111,9 @@ pub enum HeaderProblem {
     /// Fewer than two cameras.
     #[error("a point takes the pixels of at least two cameras")]
     TooFewCameras,
+    /// Not the header of a list of pixels.
+    #[error("a list of pixels has an id and one pixel")]
+    NoList,
 }
 
 /// What is wrong with a row.
@@ -146,6 +149,9 @@ pub enum RowProblem {
     /// Only one of u and v is given.
     #[error("one of u and v is empty and the other is not")]
     HalfPixel,
+    /// A row of a list of pixels without one.
+    #[error("u and v are empty")]
+    NoPixel,
     /// Fewer than two cameras saw the point.
     #[error("{have} of the cameras saw this point, it takes 2")]
     TooFewPixels {
@@ -185,7 +191,7 @@ impl Remedy for MatchesError {
                 RowProblem::NotANumber { .. } | RowProblem::NotFinite { .. } => {
                     "give pixels as numbers; leave both u and v empty for a camera that did not see the point"
                 }
-                RowProblem::HalfPixel | RowProblem::TooFewPixels { .. } => {
+                RowProblem::NoPixel | RowProblem::HalfPixel | RowProblem::TooFewPixels { .. } => {
                     "give u and v for at least two cameras, or take the line away"
                 }
                 RowProblem::TooManyPixels { .. } => {

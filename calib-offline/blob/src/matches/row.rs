@@ -30,12 +30,11 @@ pub(super) fn parse<'a, N: Number>(
     if fields.next().is_some() {
         return Err(field_count(rest, columns));
     }
-    if sightings.len() < 2 {
-        return Err(RowProblem::TooFewPixels {
-            have: sightings.len(),
-        });
+    match (sightings.len(), columns.camera_idx.len()) {
+        (0, 1) => Err(RowProblem::NoPixel),
+        (have @ (0 | 1), 2..) => Err(RowProblem::TooFewPixels { have }),
+        _ => Ok(id),
     }
-    Ok(id)
 }
 
 /// The id of a row, without the quotes that may protect it.

@@ -2,7 +2,7 @@
 //! written in order.
 
 use super::blob_source::BlobSource;
-use super::error::{MatchesError, RowProblem, shortened};
+use super::error::{HeaderProblem, MatchesError, RowProblem, shortened};
 use super::header::Columns;
 use super::row::{self, POINTS_HEADER};
 use calib_rays::measure::{BatchSource, Number, Point, PointSource, RigSource, Sighting, Status};
@@ -87,12 +87,15 @@ fn measure_stream<S: PointSource>(
     input: &mut impl Read,
     output: &mut impl Write,
 ) -> Result<MeasureSummary, StreamError> {
-    measure_blocks(&source.cameras(), file, input, output, |columns, block| {
+    let cameras = source.cameras();
+    let table = Table::of_matches(&cameras);
+    in_blocks(&table, file, input, output, |columns, block| {
         let pieces = pieces(block).into_par_iter();
         Ok(pieces
             .map(|piece| measure_piece(source, columns, piece))
             .collect())
     })
+    .map(|total| total.summary())
 }
 
 /// The same with a source that answers many matches of two cameras at once, block by block.
@@ -106,9 +109,11 @@ pub fn measure_batches<S: BatchSource>(
     output: &mut impl Write,
 ) -> Result<MeasureSummary, StreamError<S::Error>> {
     let cameras = source.cameras();
-    measure_blocks(&cameras, file, input, output, |columns, block| {
+    let table = Table::of_matches(&cameras);
+    in_blocks(&table, file, input, output, |columns, block| {
         Ok(vec![ask_piece(source, columns, block)?])
     })
+    .map(|total| total.summary())
 }
 
 /// Hands on the sightings of every match of `input`; `file` is for messages only.
@@ -132,7 +137,8 @@ pub(super) fn each_match<N: Number>(
             ..Piece::default()
         }])
     };
-    match measure_blocks(cameras, file, input, &mut io::sink(), read) {
+    let table = Table::of_matches(cameras);
+    match in_blocks(&table, file, input, &mut io::sink(), read) {
         Ok(_) => Ok(()),
         Err(StreamError::Matches(error)) => Err(error),
         Err(StreamError::Write(source)) => Err(MatchesError::Read {
@@ -142,14 +148,27 @@ pub(super) fn each_match<N: Number>(
     }
 }
 
-/// Has every block of the input measured and writes what comes of it.
-fn measure_blocks<E>(
-    cameras: &[String],
+/// What a header says, or what is wrong with it.
+type ReadHeader<'a> = Box<dyn Fn(&str) -> Result<Columns, HeaderProblem> + 'a>;
+
+/// The heads of what is read and of what is written.
+pub(super) struct Table<'a> {
+    /// A header that would be right.
+    pub expected: String,
+    /// Reads one.
+    pub columns: ReadHeader<'a>,
+    /// The header written.
+    pub output_header: &'static str,
+}
+
+/// Has every block of the input answered and writes what comes of it.
+pub(super) fn in_blocks<E>(
+    table: &Table<'_>,
     file: &Path,
     input: &mut impl Read,
     output: &mut impl Write,
-    mut measure: impl FnMut(&Columns, &[u8]) -> Result<Vec<Piece>, E>,
-) -> Result<MeasureSummary, StreamError<E>> {
+    mut answer: impl FnMut(&Columns, &[u8]) -> Result<Vec<Piece>, E>,
+) -> Result<Tally, StreamError<E>> {
     let mut blocks = Blocks {
         input,
         file,
@@ -161,7 +180,7 @@ fn measure_blocks<E>(
     let mut columns = None;
     let mut total = Tally::default();
     output
-        .write_all(POINTS_HEADER.as_bytes())
+        .write_all(table.output_header.as_bytes())
         .and_then(|()| output.write_all(b"\n"))
         .map_err(StreamError::Write)?;
     while let Some(mut block) = blocks.next()? {
@@ -171,9 +190,9 @@ fn measure_blocks<E>(
             let (header, rest) = first_line(block);
             block = rest;
             line += 1;
-            columns.insert(parse_header(file, header, cameras)?)
+            columns.insert(table.read(file, header)?)
         };
-        for piece in measure(columns, block).map_err(StreamError::Source)? {
+        for piece in answer(columns, block).map_err(StreamError::Source)? {
             if let Some(problem) = piece.problem {
                 return Err(StreamError::Matches(MatchesError::Row {
                     file: file.to_owned(),
@@ -189,10 +208,10 @@ fn measure_blocks<E>(
     if columns.is_none() {
         return Err(StreamError::Matches(MatchesError::Empty {
             file: file.to_owned(),
-            expected: Columns::header_for(cameras),
+            expected: table.expected.clone(),
         }));
     }
-    Ok(total.summary())
+    Ok(total)
 }
 
 /// The input in blocks that end with a line.
@@ -245,30 +264,44 @@ fn first_line(bytes: &[u8]) -> (&[u8], &[u8]) {
     (line.strip_suffix(b"\r").unwrap_or(line), rest)
 }
 
+/// Reads the header of a list of matches.
 pub(super) fn parse_header(
     file: &Path,
     header: &[u8],
     cameras: &[String],
 ) -> Result<Columns, MatchesError> {
-    let text = String::from_utf8_lossy(header);
-    let text = text.strip_prefix('\u{feff}').unwrap_or(&text).trim();
-    let expected = Columns::header_for(cameras);
-    if text.is_empty() {
-        return Err(MatchesError::Empty {
-            file: file.to_owned(),
-            expected,
-        });
+    Table::of_matches(cameras).read(file, header)
+}
+
+impl<'a> Table<'a> {
+    fn of_matches(cameras: &'a [String]) -> Self {
+        Self {
+            expected: Columns::header_for(cameras),
+            columns: Box::new(move |header| Columns::parse(header, cameras)),
+            output_header: POINTS_HEADER,
+        }
     }
-    Columns::parse(text, cameras).map_err(|problem| MatchesError::Header {
-        file: file.to_owned(),
-        found: shortened(text),
-        problem,
-        expected,
-    })
+
+    fn read(&self, file: &Path, header: &[u8]) -> Result<Columns, MatchesError> {
+        let text = String::from_utf8_lossy(header);
+        let text = text.strip_prefix('\u{feff}').unwrap_or(&text).trim();
+        if text.is_empty() {
+            return Err(MatchesError::Empty {
+                file: file.to_owned(),
+                expected: self.expected.clone(),
+            });
+        }
+        (self.columns)(text).map_err(|problem| MatchesError::Header {
+            file: file.to_owned(),
+            found: shortened(text),
+            problem,
+            expected: self.expected.clone(),
+        })
+    }
 }
 
 /// Cuts a block into pieces that end with a line.
-fn pieces(mut block: &[u8]) -> Vec<&[u8]> {
+pub(super) fn pieces(mut block: &[u8]) -> Vec<&[u8]> {
     let mut pieces = Vec::with_capacity(block.len() / PIECE_LEN + 1);
     while !block.is_empty() {
         let from = PIECE_LEN.min(block.len());
@@ -285,16 +318,16 @@ fn pieces(mut block: &[u8]) -> Vec<&[u8]> {
 
 /// Counts of one piece or of all.
 #[derive(Debug, Clone, Copy, Default)]
-struct Tally {
-    ok: usize,
-    outside: usize,
+pub(super) struct Tally {
+    pub ok: usize,
+    pub outside: usize,
     parallel: usize,
     behind: usize,
     gap_squared_sum_mm2: f64,
 }
 
 impl Tally {
-    fn count(&mut self, result: Result<f64, Status>) {
+    pub fn count(&mut self, result: Result<f64, Status>) {
         match result {
             Ok(gap_mm) => {
                 self.ok += 1;
@@ -328,11 +361,11 @@ impl Tally {
 
 /// What came of one piece: all its rows, or the rows before the first that is wrong.
 #[derive(Default)]
-struct Piece {
-    out: Vec<u8>,
-    lines: usize,
-    tally: Tally,
-    problem: Option<RowProblem>,
+pub(super) struct Piece {
+    pub out: Vec<u8>,
+    pub lines: usize,
+    pub tally: Tally,
+    pub problem: Option<RowProblem>,
 }
 
 impl Piece {
@@ -388,7 +421,7 @@ fn ask_piece<S: BatchSource>(
 }
 
 /// Hands every row on, up to the first that is wrong; how many lines that were, and what is wrong.
-fn each_row<'a, N: Number>(
+pub(super) fn each_row<'a, N: Number>(
     columns: &Columns,
     bytes: &'a [u8],
     mut take: impl FnMut(&'a str, &[Sighting<N>]) -> Result<(), RowProblem>,

@@ -2,7 +2,7 @@
 //!
 //! Around an inner corner the image is modelled as `(1 + g . d) (m + a E(n1) E(n2))`: `n1`, `n2` are the
 //! signed distances to two straight lines through the corner, `E` is a step blurred by the lens and
-//! integrated over the pixel ([`PixelEdge`]), and g is a slope of the light over the distance d from
+//! integrated over the pixel (`pixel_edge.rs`), and g is a slope of the light over the distance d from
 //! the window's middle. Nine unknowns (corner, two line directions, mean `m`, amplitude `a`, variance
 //! of the blur, two slopes) are found by least squares over all pixels of the window, so the corner is
 //! carried by the whole length of its edges instead of by the few pixels at their crossing. On the
