@@ -27,7 +27,7 @@ use calib_estimate::adjust::Observations;
 use calib_judge::agreement::{Whole, agreement};
 use calib_judge::half_data::first_halves;
 use calib_judge::held_out::folds_wanted;
-use calib_judge::plausibility::Sheet;
+use calib_judge::plausibility::{Sheet, units_of_places};
 use calib_judge::screened::screened;
 use calib_judge::unexpected_optics::unexpected_optics;
 use calib_judge::verdict::Thresholds;
@@ -216,6 +216,11 @@ pub fn calibrate_corners(
             causes.push(left_out);
         }
     }
+    let mm_per_px = solution.mm_per_px();
+    let distance_mm = solution.distance_mm();
+    // Data that were taken for others than they are come first.
+    let misread = units_of_places(dataset, &solution.rig, distance_mm, mm_per_px);
+    causes.splice(0..0, misread);
     let central = checks.as_ref().map(|checks| &checks.central_model);
     causes.extend(central.and_then(|c| unexpected_optics(dataset, &solution.rig, c)));
     let whole = Whole {
@@ -232,7 +237,7 @@ pub fn calibrate_corners(
         solution: &solution,
         held_out: &held_out(&folds),
         agreement: agreement(&whole, &folds),
-        mm_per_px: solution.mm_per_px(),
+        mm_per_px,
         left_open_mm: solution.own.left_open_mm(&solution.rig),
         checks: checks.as_ref(),
         causes: &causes,

@@ -124,17 +124,24 @@ impl Solution {
         )
     }
 
-    /// What a pixel in the middle of the first camera is at the median distance of its boards, mm.
-    pub fn mm_per_px(&self) -> f64 {
+    /// Median distance of the boards from the first camera, mm; 0 without any.
+    pub fn distance_mm(&self) -> f64 {
         let Some(camera) = self.rig.cameras.first() else {
             return 0.0;
         };
         let middle = self.observations.board.center_in_board();
         let place = camera.rig_from_camera.translation_mm;
         let poses = self.rig_from_board.iter();
-        let distance_mm = median(poses.map(|pose| (pose.point(&middle) - place).norm()));
+        median(poses.map(|pose| (pose.point(&middle) - place).norm())).unwrap_or(0.0)
+    }
+
+    /// What a pixel in the middle of the first camera is at that distance, mm.
+    pub fn mm_per_px(&self) -> f64 {
+        let Some(camera) = self.rig.cameras.first() else {
+            return 0.0;
+        };
         let sample = camera.field.sample(camera.field.sensor.center());
-        distance_mm.unwrap_or(0.0) * sample.ds.determinant().abs().sqrt()
+        self.distance_mm() * sample.ds.determinant().abs().sqrt()
     }
 
     /// Number of different poses that went in; one that was split counts once.

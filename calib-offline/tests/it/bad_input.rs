@@ -210,6 +210,33 @@ fn refused_points(manifest: &str, change: impl Fn(&mut Vec<String>), code: i32, 
     refused(manifest, lines.join("\n").as_bytes(), code, parts);
 }
 
+/// Whoever writes places in meters gets cameras a tenth of a millimeter apart.
+#[test]
+fn places_in_meters_are_doubted() {
+    let mut lines = vec!["camera,pose,u,v,x_mm,y_mm,z_mm".to_owned()];
+    for (camera, right_mm) in [("left", 0.0), ("right", 100.0)] {
+        for k in 0..49 * 4 {
+            let [x, y, z] = [k % 7, k / 7 % 7, k / 49].map(f64::from);
+            let [x, y, z] = [30.0 * x - 60.0, 30.0 * y - 90.0, 40.0 * z];
+            // A hundredth of a pixel of noise, the same every time.
+            let noise = 0.01 * f64::from(k * 7919 % 13 - 6) / 6.0;
+            let u = 320.0 + 900.0 * (x - right_mm) / (700.0 + z) + noise;
+            let v = 240.0 + 900.0 * y / (700.0 + z) - noise;
+            lines.push(format!(
+                "{camera},0,{u},{v},{},{},{}",
+                x / 1e3,
+                y / 1e3,
+                z / 1e3
+            ));
+        }
+    }
+    let folder = dataset(POINTS, lines.join("\n").as_bytes());
+    let object = run(folder.path(), &["calibrate", "set", "-o", "out", "--json"]).json();
+    assert_eq!(object["causes"][0]["cause"], "square-unit", "{object:#}");
+    let size = object["causes"][0]["size"].to_string();
+    assert!(size.contains("meters"), "{size}");
+}
+
 #[test]
 fn points_that_cannot_be() {
     refused_points(

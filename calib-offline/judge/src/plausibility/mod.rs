@@ -32,3 +32,4 @@ mod whole_camera;
 pub use finding::Explained;
 pub use sheet::Sheet;
 pub use stage_angles::{Dial, dial};
+pub use units::units_of_places;

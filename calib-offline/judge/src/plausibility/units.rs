@@ -6,7 +6,9 @@ use super::measured::extent_mm;
 use super::whole_camera::WholeCamera;
 use crate::cause::{Cause, Code};
 use crate::verdict::Grade;
+use calib_rays::field::Rig;
 use calib_rays::numerics::median;
+use calib_recording::dataset::Dataset;
 
 /// Two lenses of ordinary cameras stand no nearer than their housings allow, mm: board cameras are 25 to
 /// 40 mm wide, the smallest modules some 20.
@@ -81,6 +83,48 @@ impl Size {
             length(self.distance_mm)
         )
     }
+}
+
+/// The same of points with known places, by the rig that was calibrated with them: `distance_mm` from the cameras,
+/// `footprint_mm` a pixel there.
+pub fn units_of_places(
+    dataset: &Dataset,
+    rig: &Rig,
+    distance_mm: f64,
+    footprint_mm: f64,
+) -> Option<Cause> {
+    if dataset.certificate.is_some() || dataset.board.layout.is_grid() {
+        return None;
+    }
+    let (width, height) = dataset.board.extent_mm();
+    let place = |k: usize| rig.cameras[k].rig_from_camera.translation_mm;
+    let pairs = (0..rig.cameras.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
+    let size = Size {
+        width_mm: width.max(height),
+        distance_mm,
+        baseline_mm: pairs
+            .map(|(a, b)| (place(a) - place(b)).norm())
+            .min_by(f64::total_cmp),
+        footprint_mm,
+    };
+    let objection = size.objection()?;
+    // Whoever writes another unit for mm writes meters or inches as a rule; centimeters are the mildest.
+    let (unit, factor) = UNITS
+        .iter()
+        .rev()
+        .find(|(_, factor)| size.scaled(*factor).objection().is_none())?;
+    let text = format!(
+        "the places in corners.csv mean {}, and {objection}; in {unit} it is {}; write them in millimeters",
+        size.words(),
+        size.scaled(*factor).words()
+    );
+    Some(cause(
+        Code::SquareUnit,
+        Grade::Doubtful,
+        format!("{unit} for mm, {factor} times"),
+        (factor - 1.0) * size.width_mm,
+        text,
+    ))
 }
 
 /// Doubts a unit in which the rig is implausible on its face; a board with a certificate is believed.
