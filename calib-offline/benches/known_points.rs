@@ -71,6 +71,9 @@ fn run() -> Result<()> {
                 found.without,
                 found.cpu_s / reference_s
             );
+            if left_out.is_empty() {
+                println!("    along z by depth, mean and scatter: {}", found.by_depth);
+            }
         }
     }
     Ok(())
@@ -82,6 +85,8 @@ struct Score {
     rms_z_mm: f64,
     without: usize,
     cpu_s: f64,
+    /// Error along z of the marks of each depth, mm, in words.
+    by_depth: String,
 }
 
 /// Calibrates from the marks of the other depths and measures all.
@@ -130,6 +135,7 @@ fn score(marks: &[Mark], left_out_mm: &[f64]) -> Result<Score> {
     )?;
     let text = std::fs::read_to_string(folder.path().join("points.csv"))?;
     let (mut sum, mut sum_z, mut count, mut without) = (0.0, 0.0, 0.0, 0);
+    let mut by_depth: BTreeMap<i64, Vec<f64>> = BTreeMap::new();
     for (mark, line) in marks.iter().zip(text.lines().skip(1)) {
         let fields: Vec<&str> = line.split(',').collect();
         let [_, x, y, z, ..] = fields[..] else {
@@ -140,6 +146,8 @@ fn score(marks: &[Mark], left_out_mm: &[f64]) -> Result<Score> {
                 let error = Vector3::new(x, y, z) - mark.at_mm;
                 sum += error.norm_squared();
                 sum_z += error.z * error.z;
+                let depth = by_depth.entry(mark.at_mm.z.round() as i64);
+                depth.or_default().push(error.z);
                 count += 1.0;
             }
             _ => without += 1,
@@ -150,7 +158,18 @@ fn score(marks: &[Mark], left_out_mm: &[f64]) -> Result<Score> {
         rms_z_mm: (sum_z / f64::max(count, 1.0)).sqrt(),
         without,
         cpu_s,
+        by_depth: words(&by_depth),
     })
+}
+
+fn words(by_depth: &BTreeMap<i64, Vec<f64>>) -> String {
+    let of = |(depth, errors): (&i64, &Vec<f64>)| {
+        let count = errors.len() as f64;
+        let mean = errors.iter().sum::<f64>() / count;
+        let scatter = errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / count;
+        format!("{depth}: {mean:.2} +- {:.2}", scatter.sqrt())
+    };
+    by_depth.iter().map(of).collect::<Vec<_>>().join(", ")
 }
 
 /// Runs the program; a verdict "fail" is an answer too.

@@ -3,6 +3,7 @@
 mod alternating;
 mod bad_images;
 mod bad_input;
+mod bad_points;
 mod bad_views;
 mod calibration_file;
 mod commands;

@@ -12,7 +12,7 @@ use calib_targets_chessboard::{
     detect_corners,
 };
 use chess_corners::ImageRefiner;
-use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 /// A corner as the detector numbered it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,8 +44,6 @@ pub trait ChessboardDetector: Sync {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ChessTopologicalDetector;
 
-/// Sizes tried: full, half and quarter.
-const SCALES: [Scale; 3] = [Scale::FULL, Scale(2.0), Scale(4.0)];
 /// Images with more pixels than this are searched at half size first, with sixteen times more at a
 /// quarter.
 const LARGE_PIXELS: usize = 600_000;
@@ -56,32 +54,28 @@ impl ChessboardDetector for ChessTopologicalDetector {
     fn detect(&self, image: &GrayImage, board: &BoardSpec) -> Vec<Vec<RawCorner>> {
         let pixels = image.values.len();
         let order = if pixels > 16 * LARGE_PIXELS {
-            [2, 1, 0]
+            [Size::Quarter, Size::Half, Size::Full]
         } else if pixels > LARGE_PIXELS {
-            [1, 0, 2]
+            [Size::Half, Size::Full, Size::Quarter]
         } else {
-            [0, 1, 2]
+            [Size::Full, Size::Half, Size::Quarter]
         };
-        let mut found: [Vec<Vec<RawCorner>>; 3] = Default::default();
-        for step in order {
-            let Some(at_scale) = reduced(image, step) else {
-                continue;
-            };
-            let grids = detect_at(&at_scale, SCALES[step]);
+        let mut found = BTreeMap::new();
+        for size in order {
+            let grids = parts_at(image, size);
             if grids.iter().any(|grid| is_whole(grid, board)) {
                 return grids;
             }
-            found[step] = grids;
+            found.insert(size, grids);
         }
-        let [mut best, half, quarter] = found;
-        take_larger(&mut best, half, board);
-        take_larger(&mut best, quarter, board);
+        // Larger sizes first.
+        let mut best = Vec::new();
+        for grids in found.into_values() {
+            take_larger(&mut best, grids, board);
+        }
         // Squares of less than eight pixels in an image that large are a thousandth of its width.
-        if pixels <= 16 * LARGE_PIXELS
-            && 2 * largest(&best, board) < board.corner_count()
-            && let Some(double) = image.doubled()
-        {
-            take_larger(&mut best, detect_at(&double, Scale::DOUBLE), board);
+        if pixels <= 16 * LARGE_PIXELS && 2 * largest(&best, board) < board.corner_count() {
+            take_larger(&mut best, parts_at(image, Size::Double), board);
         }
         best
     }
@@ -117,13 +111,6 @@ fn largest(grids: &[Vec<RawCorner>], board: &BoardSpec) -> usize {
     grids.iter().map(count).max().unwrap_or(0)
 }
 
-/// The image halved so often; `None` if nothing is left of it.
-fn reduced(image: &GrayImage, times: usize) -> Option<Cow<'_, GrayImage>> {
-    (0..times).try_fold(Cow::Borrowed(image), |image, _| {
-        Some(Cow::Owned(image.halved()?))
-    })
-}
-
 /// A corner more or less at another size is no reason to give up the sharper ones.
 fn take_larger(best: &mut Vec<Vec<RawCorner>>, found: Vec<Vec<RawCorner>>, board: &BoardSpec) {
     let count = largest(best, board);
@@ -138,6 +125,8 @@ struct Scale(f64);
 
 impl Scale {
     const FULL: Self = Self(1.0);
+    const HALF: Self = Self(2.0);
+    const QUARTER: Self = Self(4.0);
     const DOUBLE: Self = Self(0.5);
 
     /// In the original; pixels are areas whose outer edges coincide.
@@ -147,7 +136,7 @@ impl Scale {
 }
 
 /// A size at which an image is searched.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Size {
     /// As it is.
     Full,
@@ -177,8 +166,11 @@ pub fn parts_at(image: &GrayImage, size: Size) -> Vec<Vec<RawCorner>> {
     };
     match size {
         Size::Full => detect_at(image, Scale::FULL),
-        Size::Half => at(image.halved(), SCALES[1]),
-        Size::Quarter => at(image.halved().and_then(|half| half.halved()), SCALES[2]),
+        Size::Half => at(image.halved(), Scale::HALF),
+        Size::Quarter => at(
+            image.halved().and_then(|half| half.halved()),
+            Scale::QUARTER,
+        ),
         Size::Double => at(image.doubled(), Scale::DOUBLE),
     }
 }

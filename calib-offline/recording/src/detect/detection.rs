@@ -1,6 +1,6 @@
 //! What was found in a dataset's images.
 
-use super::pair_check::PairCheck;
+use super::pair_check::{PairCheck, pair_checks};
 use super::verdict::{ImageVerdict, Outcome};
 use calib_rays::observed::View;
 
@@ -17,6 +17,18 @@ pub struct Detection {
     pub pair_checks: Vec<PairCheck>,
 }
 
+impl Detection {
+    /// Of the views and verdicts, each by camera and pose.
+    pub(super) fn of(views: Vec<View>, images: Vec<ImageVerdict>) -> Self {
+        Self {
+            turned: turned_images(&images),
+            pair_checks: pair_checks(&views),
+            views,
+            images,
+        }
+    }
+}
+
 /// An image in which the board is turned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TurnedImage {
@@ -30,7 +42,7 @@ pub struct TurnedImage {
 
 /// The images turned against the majority. Of equally common turns, the smallest counts as the
 /// majority's.
-pub(super) fn turned_images(images: &[ImageVerdict]) -> Vec<TurnedImage> {
+fn turned_images(images: &[ImageVerdict]) -> Vec<TurnedImage> {
     let turns = |image: &ImageVerdict| match image.outcome {
         Outcome::Used { quarter_turns, .. } => Some(quarter_turns),
         Outcome::Refused(_) => None,

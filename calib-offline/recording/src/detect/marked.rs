@@ -2,9 +2,9 @@
 
 use super::chessboard::RawCorner;
 use super::grid::Node;
+use super::homography::Homography;
 use super::labelling::Placement;
 use super::printed::charuco_parts::Part;
-use super::printed::homography::Homography;
 use crate::dataset::image::GrayImage;
 use calib_rays::print::chessboard::DOT;
 use nalgebra::{Matrix2, Vector2};

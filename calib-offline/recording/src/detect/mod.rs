@@ -13,12 +13,15 @@ pub mod border;
 pub mod chessboard;
 pub mod consistency;
 pub mod corner_fit;
+mod corner_window;
 mod detection;
 mod edge_fit;
+mod edge_model;
 pub mod epipolar;
 mod error;
 pub mod grid;
 pub mod grid_size;
+pub mod homography;
 pub mod illegible;
 mod job;
 pub mod labelling;
@@ -33,6 +36,7 @@ mod seen_board;
 mod settings;
 pub mod turning;
 pub mod verdict;
+mod wrong_count;
 
 pub use detection::{Detection, TurnedImage};
 pub use error::{DetectError, OddImage};
@@ -48,15 +52,11 @@ use calib_rays::observed::{Corner, View};
 use calib_rays::progress::Progress;
 use chessboard::{ChessTopologicalDetector, ChessboardDetector, RawCorner};
 use consistency::UnsettledView;
-use detection::turned_images;
 use grid::FittedGrid;
-use grid_size::GridSize;
 use illegible::{Illegible, Shown};
 use job::{Job, all_loaded, check_sizes};
 use labelling::{Placement, placements};
-use pair_check::pair_checks;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 use verdict::{
     ImageFigures, ImageVerdict, MissingCorner, Outcome, Refusal, why_not_placed, why_nothing_found,
 };
@@ -115,7 +115,10 @@ pub fn detect_dataset_with(
         .collect();
     progress.end();
     let mut inspected = all_loaded(dataset, &jobs, loaded)?;
-    check_count(&dataset.board, &inspected)?;
+    let others = inspected.iter().filter_map(|found| found.as_ref().err());
+    let is_stated = |found: &&Inspected| found.grid.corners.len() == dataset.board.corner_count();
+    let stated_count = inspected.iter().flatten().filter(is_stated).count();
+    wrong_count::check(&dataset.board, others, stated_count, inspected.len())?;
     for camera_idx in 0..dataset.cameras.len() {
         let of_camera = jobs.iter().zip(&mut inspected);
         let of_camera = of_camera.filter(|(job, _)| job.camera_idx == camera_idx);
@@ -182,12 +185,7 @@ pub fn detect_dataset_with(
             missing,
         });
     }
-    Ok(Detection {
-        turned: turned_images(&images),
-        pair_checks: pair_checks(&views),
-        views,
-        images,
-    })
+    Ok(Detection::of(views, images))
 }
 
 /// The images to look at, by camera and pose.
@@ -206,44 +204,6 @@ fn jobs(dataset: &Dataset) -> Vec<Job<'_>> {
         }
     }
     jobs
-}
-
-/// Fewest images with the same other board that speak against the manifest.
-const SEVERAL: usize = 2;
-
-/// Whether the manifest's count is that of the boards seen: partial boards would be given labels off by a row.
-///
-/// # Errors
-/// [`DetectError::WrongCount`] where more images show one whole board of another size than show the manifest's.
-fn check_count(
-    board: &BoardSpec,
-    inspected: &[Result<Inspected, Refusal>],
-) -> Result<(), DetectError> {
-    let mut others: BTreeMap<GridSize, usize> = BTreeMap::new();
-    for found in inspected {
-        if let Err(Refusal::WrongBoard {
-            found,
-            is_whole: true,
-            ..
-        }) = found
-        {
-            *others.entry(*found).or_default() += 1;
-        }
-    }
-    let is_stated = |found: &&Inspected| found.grid.corners.len() == board.corner_count();
-    let stated_count = inspected.iter().flatten().filter(is_stated).count();
-    match others.into_iter().max_by_key(|(_, count)| *count) {
-        Some((found, count)) if count >= SEVERAL && count > stated_count => {
-            Err(DetectError::WrongCount {
-                found,
-                stated: GridSize::stated(board),
-                count,
-                stated_count,
-                of: inspected.len(),
-            })
-        }
-        _ => Ok(()),
-    }
 }
 
 /// What one image shows by itself: the corners, and where on the board they can be. Of several grids the one that

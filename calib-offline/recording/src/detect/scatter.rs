@@ -7,6 +7,7 @@
 //! is the corners' own scatter, and what of it no fit predicted is the error of its model.
 
 use super::corner_fit::FittedCorner;
+use super::homography::Homography;
 use calib_rays::numerics::median;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
 use std::collections::BTreeMap;
@@ -81,7 +82,9 @@ impl Smooth {
         let (board, _) = scaled(&board)?;
         let (image, px_per_unit) = scaled(&image)?;
         let corners: Vec<_> = board.into_iter().zip(image).collect();
-        let start = homography(&corners)?;
+        // Points around the origin: its image is in front, and the last element positive.
+        let start = Homography::fit(&corners)?.matrix();
+        let start = start / start[(2, 2)];
         Some(Self {
             corners,
             px_per_unit,
@@ -161,31 +164,6 @@ fn scaled(points: &[Vector2<f64>]) -> Option<(Vec<Vector2<f64>>, f64)> {
         .fold(0.0, f64::max);
     let unit = |p: &Vector2<f64>| (p - middle) / reach;
     (reach > 0.0).then(|| (points.iter().map(unit).collect(), reach))
-}
-
-/// A homography between point pairs, its last element 1: linear least squares.
-fn homography(pairs: &[(Vector2<f64>, Vector2<f64>)]) -> Option<Matrix3<f64>> {
-    let mut design = DMatrix::zeros(2 * pairs.len(), 8);
-    let mut right = DVector::zeros(2 * pairs.len());
-    for (k, (from, to)) in pairs.iter().enumerate() {
-        for axis in 0..2 {
-            let row = 2 * k + axis;
-            right[row] = to[axis];
-            for (c, value) in [from.x, from.y, 1.0].into_iter().enumerate() {
-                design[(row, 3 * axis + c)] = value;
-                if c < 2 {
-                    design[(row, 6 + c)] = -to[axis] * value;
-                }
-            }
-        }
-    }
-    let h = design
-        .tr_mul(&design)
-        .cholesky()?
-        .solve(&design.tr_mul(&right));
-    Some(Matrix3::new(
-        h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], 1.0,
-    ))
 }
 
 #[cfg(test)]

@@ -64,24 +64,18 @@ impl MissingCorner {
         sensor: SensorSize,
     ) -> Vec<Self> {
         let found = grid.corners.keys().map(|&node| placement.row_col(node));
-        let found: BTreeSet<(usize, usize)> = found.collect();
+        let mut missing = Self::beside(found, board);
         let predicted: BTreeMap<(usize, usize), PixelPoint> = grid
             .extended(board)
             .into_iter()
             .filter(|&(node, _)| placement.is_on_board(node, board))
             .map(|(node, pixel)| (placement.row_col(node), pixel))
             .collect();
-        let all = (0..board.rows).flat_map(|row| (0..board.cols).map(move |col| (row, col)));
-        all.filter(|label| !found.contains(label))
-            .map(|(row, col)| Self {
-                row,
-                col,
-                pixel: predicted
-                    .get(&(row, col))
-                    .copied()
-                    .filter(|&pixel| sensor.contains(pixel)),
-            })
-            .collect()
+        for corner in &mut missing {
+            let pixel = predicted.get(&(corner.row, corner.col)).copied();
+            corner.pixel = pixel.filter(|&pixel| sensor.contains(pixel));
+        }
+        missing
     }
 }
 

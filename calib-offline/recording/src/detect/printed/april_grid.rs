@@ -6,10 +6,10 @@
 
 use super::cells::{Placed, read};
 use super::found::{Found, PrintedTarget};
-use super::homography::Homography;
 use super::quads::quads;
 use super::saddles::{self, Crossing, Crossings, Label};
 use crate::dataset::image::GrayImage;
+use crate::detect::homography::Homography;
 use crate::detect::seen_board::SeenBoard;
 use crate::detect::settings::DetectSettings;
 use crate::detect::turning::turns_like_image;

@@ -1,7 +1,7 @@
 //! Reading a coded marker: which of its cells are black.
 
-use super::homography::Homography;
 use crate::dataset::image::GrayImage;
+use crate::detect::homography::Homography;
 
 /// Points along each axis at which a cell is sampled, about its middle, in cells.
 const SAMPLES: [f64; 3] = [-0.22, 0.0, 0.22];

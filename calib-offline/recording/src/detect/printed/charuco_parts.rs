@@ -1,10 +1,10 @@
 //! Connected parts of a `ChArUco` board's corners, and what the markers in their cells say of their place.
 
 use super::cells::{Placed, read};
-use super::homography::Homography;
 use crate::dataset::image::GrayImage;
 use crate::detect::chessboard::RawCorner;
 use crate::detect::grid::Node;
+use crate::detect::homography::Homography;
 use crate::detect::labelling::Placement;
 use calib_rays::print::{Charuco, Codes};
 use nalgebra::Vector2;

@@ -12,7 +12,6 @@ pub mod charuco_parts;
 pub mod charuco_seen;
 pub mod circles;
 pub mod found;
-pub mod homography;
 pub mod quads;
 pub mod rings;
 pub mod saddles;
@@ -20,10 +19,8 @@ mod smooth;
 mod turns;
 
 use super::detection::Detection;
-use super::detection::turned_images;
 use super::error::DetectError;
 use super::job::{Job, all_loaded};
-use super::pair_check::pair_checks;
 use super::settings::DetectSettings;
 use super::verdict::{ImageVerdict, MissingCorner, Outcome};
 use crate::dataset::image::GrayImage;
@@ -93,12 +90,7 @@ pub(super) fn detect(
             missing,
         });
     }
-    Ok(Detection {
-        turned: turned_images(&images),
-        pair_checks: pair_checks(&views),
-        views,
-        images,
-    })
+    Ok(Detection::of(views, images))
 }
 
 fn view(job: &Job<'_>, corners: Vec<Corner>, settings: &DetectSettings) -> View {

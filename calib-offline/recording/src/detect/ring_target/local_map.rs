@@ -3,8 +3,9 @@
 //! Grid coordinates: (column, row) as real numbers, one unit per pitch. The homography carries the
 //! perspective, the polynomial what the lens adds; neither has a meaning beyond this image.
 
+use crate::detect::homography::Homography;
 use calib_rays::numerics::SingularValues;
-use nalgebra::{DMatrix, Matrix2, Matrix3, SMatrix, Vector2, Vector3};
+use nalgebra::{DMatrix, Matrix2, Matrix3, Vector2};
 
 /// Fewest markers that are mapped; four would fix a homography and leave nothing to check it by.
 pub const MIN_POINTS: usize = 8;
@@ -50,7 +51,7 @@ impl LocalMap {
                 )
             })
             .collect();
-        let homography = homography(&normalized)?;
+        let homography = Homography::fit(&normalized)?.matrix();
         let mut map = Self {
             middle: grid_middle,
             scale: grid_scale,
@@ -152,46 +153,6 @@ fn frame(points: impl Iterator<Item = Vector2<f64>> + Clone) -> Option<(Vector2<
     let square = points.map(|p| (p - middle).norm_squared()).sum::<f64>() / count;
     (square > 0.0 && square.is_finite()).then(|| (middle, 1.0 / square.sqrt()))
 }
-
-/// The homography between normalized points that solves the linear equations best: the direction in
-/// which they are least different from zero.
-fn homography(pairs: &[(Vector2<f64>, Vector2<f64>)]) -> Option<Matrix3<f64>> {
-    let mut normal = SMatrix::<f64, 9, 9>::zeros();
-    for (from, to) in pairs {
-        let p = from.push(1.0);
-        for (axis, value) in [(0, to.x), (1, to.y)] {
-            let mut row = SVector9::zeros();
-            row.fixed_rows_mut::<3>(3 * axis).copy_from(&p);
-            row.fixed_rows_mut::<3>(6).copy_from(&(-value * p));
-            normal.ger(1.0, &row, &row, 1.0);
-        }
-    }
-    let eigen = normal.symmetric_eigen();
-    let mut order: Vec<usize> = (0..9).collect();
-    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
-    let (least, next) = (*order.first()?, *order.get(1)?);
-    // Points on a line leave a second direction open.
-    if eigen.eigenvalues[next] < 1e-9 * eigen.eigenvalues.max() {
-        return None;
-    }
-    let h = eigen.eigenvectors.column(least);
-    let row = |k: usize| Vector3::new(h[3 * k], h[3 * k + 1], h[3 * k + 2]).transpose();
-    let matrix = Matrix3::from_rows(&[row(0), row(1), row(2)]);
-    // All points are in front of the camera: one sign of the third coordinate.
-    let signs = pairs
-        .iter()
-        .map(|(from, _)| matrix.row(2).transpose().dot(&from.push(1.0)));
-    let negative = signs.clone().filter(|z| *z < 0.0).count();
-    let zero = signs.filter(|z| z.abs() < 1e-12).count();
-    match negative {
-        _ if zero > 0 => None,
-        0 => Some(matrix),
-        n if n == pairs.len() => Some(-matrix),
-        _ => None,
-    }
-}
-
-type SVector9 = nalgebra::SVector<f64, 9>;
 
 /// All products of powers of x and y up to the degree; none for degree 0.
 fn terms(p: &Vector2<f64>, degree: usize) -> Vec<f64> {
