@@ -8,7 +8,7 @@
 //! lie in view and are not covered; `both` is the RMS over the points that both found.
 
 use calib_rays::geometry::PixelPoint;
-use calib_rays::print::{AprilGrid, Artwork, Charuco, Circles, Codes, TagOrder};
+use calib_rays::print::{AprilGrid, Artwork, Charuco, Circles, Codes, TagBorder, TagOrder};
 use calib_recording::dataset::BoardKind;
 use calib_recording::dataset::image::GrayImage;
 use calib_recording::detect::{DetectSettings, printed};
@@ -79,6 +79,7 @@ fn april_grid(name: &'static str, order: TagOrder) -> Target {
         spacing: 0.3,
         codes: Codes::named("DICT_APRILTAG_36h11").expect("a dictionary"),
         first_id: 0,
+        border: TagBorder::One,
     };
     Target {
         name,

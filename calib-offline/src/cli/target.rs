@@ -29,10 +29,11 @@ fitting it to the page, and measure it. Its [board] for dataset.toml goes to sta
 a file of the same name that ends in .toml. The keys of [board] are the options:
   chessboard   rows, cols (inner corners), square_mm, marked (squares with a dot)
   charuco      rows, cols (inner corners), square_mm, marker_mm, dictionary, legacy, first_id
-  aprilgrid    rows, cols (tags), tag_mm, spacing, family [36h11], first_id
+  aprilgrid    rows, cols (tags), tag_mm, spacing, family [36h11], first_id, border_bits
   circles      rows, cols, pitch_mm, diameter_mm, asymmetric, direction
   rings        rows, cols, pitch_mm, outer_radius_mm, direction_outer_radius_mm, direction
-A printed grid of tags has its first one at the lower left, as Kalibr's; both ways round are recognized.
+A printed grid of tags has its first one at the lower left; with border_bits = 2 it is Kalibr's grid, with 1
+its tags are those of OpenCV's dictionary. Every way round and both borders are recognized.
 Marked circles (direction) are printed with a hole.
 
 With --json, schema calib-offline/target/1:
@@ -86,6 +87,9 @@ pub struct TargetArgs {
     /// Family of the tags [default: 36h11]
     #[arg(long, value_name = "NAME")]
     pub family: Option<String>,
+    /// Black cells around a tag's code: 1, or 2 as in Kalibr's grids [default: 1]
+    #[arg(long, value_name = "CELLS")]
+    pub border_bits: Option<i64>,
     /// Distance of neighbors; of rows in an asymmetric grid
     #[arg(long, value_name = "MM")]
     pub pitch_mm: Option<f64>,
@@ -207,6 +211,7 @@ fn board_text(args: &TargetArgs) -> String {
     line("spacing", length(args.spacing));
     line("family", word(&args.family));
     line("first_id", whole(args.first_id));
+    line("border_bits", whole(args.border_bits));
     line("pitch_mm", length(args.pitch_mm));
     line("diameter_mm", length(args.diameter_mm));
     line("asymmetric", flag(args.asymmetric));

@@ -4,7 +4,9 @@
 use crate::common::documented::assert_documented;
 use crate::common::{Run, run};
 use calib_rays::geometry::{PixelPoint, SensorSize};
-use calib_rays::print::{AprilGrid, Artwork, Charuco, Circles, Codes, TagOrder, chessboard};
+use calib_rays::print::{
+    AprilGrid, Artwork, Charuco, Circles, Codes, TagBorder, TagOrder, chessboard,
+};
 use calib_simulate::shots::{Shot, ShotSettings};
 use std::collections::BTreeMap;
 use std::fs;
@@ -158,8 +160,7 @@ fn a_charuco_board_of_the_old_pattern() {
     calibrates(&home);
 }
 
-#[test]
-fn a_grid_of_tags() {
+fn a_grid_of_tags(border: TagBorder, border_bits: &str) {
     let grid = AprilGrid {
         rows: 4,
         cols: 5,
@@ -167,6 +168,7 @@ fn a_grid_of_tags() {
         spacing: 0.3,
         codes: Codes::named("DICT_APRILTAG_36h11").unwrap(),
         first_id: 0,
+        border,
     };
     let options = [
         "--kind",
@@ -179,11 +181,23 @@ fn a_grid_of_tags() {
         "24",
         "--spacing",
         "0.3",
+        "--border-bits",
+        border_bits,
     ];
     let places = labelled((8, 10), |row, col| grid.corner_mm(row, col));
     // As above: the edges are shorter, and less bent.
     let home = found(&options, grid.artwork(TagOrder::Upwards), &places, 0.02);
     calibrates(&home);
+}
+
+#[test]
+fn a_grid_of_tags_of_opencvs_dictionary() {
+    a_grid_of_tags(TagBorder::One, "1");
+}
+
+#[test]
+fn kalibrs_grid_of_tags() {
+    a_grid_of_tags(TagBorder::Two, "2");
 }
 
 #[test]

@@ -68,13 +68,16 @@ impl Charuco {
                 let (x, y) = ((col as f64 - 1.0) * s, (row as f64 - 1.0) * s);
                 match self.marker_in(row, col) {
                     None => shapes.push(Shape::square(x, y, s, true)),
-                    Some(id) => draw_marker(
-                        &self.codes,
-                        id,
-                        [x + margin, y + margin],
-                        self.marker_mm,
-                        &mut shapes,
-                    ),
+                    Some(id) => {
+                        let marker = Marker {
+                            codes: &self.codes,
+                            id,
+                            side_mm: self.marker_mm,
+                            border_cells: 1,
+                            is_half_turned: false,
+                        };
+                        draw_marker(&marker, [x + margin, y + margin], &mut shapes);
+                    }
                 }
             }
         }
@@ -89,28 +92,48 @@ impl Charuco {
     }
 }
 
-/// A marker: a black square, and white cells in runs along its rows.
-pub(crate) fn draw_marker(
-    codes: &Codes,
-    id: usize,
-    [x, y]: [f64; 2],
-    side_mm: f64,
-    shapes: &mut Vec<Shape>,
-) {
-    shapes.push(Shape::square(x, y, side_mm, true));
-    let side = codes.side() as i64;
-    let cell = side_mm / (side + 2) as f64;
+/// A marker as it is printed.
+pub(crate) struct Marker<'a> {
+    pub codes: &'a Codes,
+    pub id: usize,
+    /// With its border.
+    pub side_mm: f64,
+    pub border_cells: usize,
+    /// Turned by half a turn against its dictionary.
+    pub is_half_turned: bool,
+}
+
+/// Draws a marker: a black square, and white cells in runs along its rows.
+pub(crate) fn draw_marker(marker: &Marker<'_>, [x, y]: [f64; 2], shapes: &mut Vec<Shape>) {
+    shapes.push(Shape::square(x, y, marker.side_mm, true));
+    let side = marker.codes.side() as i64;
+    let border = marker.border_cells as i64;
+    let cell = marker.side_mm / (side + 2 * border) as f64;
+    let is_black = |row: i64, col: i64| {
+        let (row, col) = if marker.is_half_turned {
+            (side - 1 - row, side - 1 - col)
+        } else {
+            (row, col)
+        };
+        marker.codes.is_black(marker.id, row, col)
+    };
     for row in 0..side {
         let mut col = 0;
         while col < side {
             let start = col;
-            while col < side && !codes.is_black(id, row, col) {
+            while col < side && !is_black(row, col) {
                 col += 1;
             }
             if col > start {
                 shapes.push(Shape::Rect {
-                    from: [x + (start + 1) as f64 * cell, y + (row + 1) as f64 * cell],
-                    to: [x + (col + 1) as f64 * cell, y + (row + 2) as f64 * cell],
+                    from: [
+                        x + (start + border) as f64 * cell,
+                        y + (row + border) as f64 * cell,
+                    ],
+                    to: [
+                        x + (col + border) as f64 * cell,
+                        y + (row + border + 1) as f64 * cell,
+                    ],
                     black: false,
                 });
             }

@@ -14,7 +14,7 @@ pub mod pdf;
 pub mod rings;
 pub mod svg;
 
-pub use april_grid::{AprilGrid, TagOrder};
+pub use april_grid::{AprilGrid, TagBorder, TagOrder};
 pub use artwork::{Artwork, Shade, Shape};
 pub use charuco::Charuco;
 pub use circles::Circles;

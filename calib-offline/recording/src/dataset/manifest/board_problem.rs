@@ -62,6 +62,12 @@ pub enum BoardProblem {
         /// The value.
         value: f64,
     },
+    /// A border that no tags have.
+    #[error("[board] border_bits = {value} is no border of a tag")]
+    Border {
+        /// The value.
+        value: i64,
+    },
     /// A marked circle or square that is no place on the grid.
     #[error("[board]: [{}] is no [row, col] of {rows} rows and {cols} cols", place.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "))]
     Direction {
@@ -96,6 +102,9 @@ impl BoardProblem {
             Self::TooManyMarkers { .. } => "correct rows, cols, first_id or the dictionary",
             Self::Spacing { .. } => {
                 "write the space between two tags divided by a tag's side, such as 0.3"
+            }
+            Self::Border { .. } => {
+                "write 1 or 2, the black cells around a tag's code, or leave it away: the images tell"
             }
             Self::Direction { .. } => "count rows and columns from 0, such as [[3, 4], [1, 2]]",
             Self::Symmetric { .. } => {

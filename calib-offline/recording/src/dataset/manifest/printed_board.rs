@@ -8,7 +8,7 @@ use super::source::{Source, ranged};
 use crate::dataset::description::BoardKind;
 use crate::dataset::target::TargetSpec;
 use calib_rays::board::BoardSpec;
-use calib_rays::print::{AprilGrid, Charuco, Circles, Codes};
+use calib_rays::print::{AprilGrid, Charuco, Circles, Codes, TagBorder};
 use toml::Spanned;
 
 /// One `[board]` while it is read.
@@ -92,6 +92,20 @@ impl Reader<'_> {
                 100_000,
             )
             .map(|id| id as usize),
+        }
+    }
+
+    fn border(&self) -> Result<TagBorder, ManifestError> {
+        let Some(value) = &self.raw.border_bits else {
+            return Ok(TagBorder::One);
+        };
+        match *value.get_ref() {
+            1 => Ok(TagBorder::One),
+            2 => Ok(TagBorder::Two),
+            value_read => {
+                let problem = BoardProblem::Border { value: value_read };
+                Err(self.problem(self.source.line_of(value), problem))
+            }
         }
     }
 
@@ -183,6 +197,7 @@ impl Reader<'_> {
             spacing: value,
             codes,
             first_id: self.first_id()?,
+            border: self.border()?,
         };
         self.check_markers(line, &codes, grid.first_id, grid.tag_count())?;
         let spec = BoardSpec::face(2 * rows, 2 * cols, |row, col| grid.corner_mm(row, col));

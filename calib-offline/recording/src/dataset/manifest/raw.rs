@@ -39,6 +39,7 @@ pub(super) struct RawBoard {
     pub tag_mm: Option<Spanned<f64>>,
     pub spacing: Option<Spanned<f64>>,
     pub family: Option<Spanned<String>>,
+    pub border_bits: Option<Spanned<i64>>,
     pub pitch_mm: Option<Spanned<f64>>,
     pub diameter_mm: Option<Spanned<f64>>,
     pub asymmetric: Option<Spanned<bool>>,

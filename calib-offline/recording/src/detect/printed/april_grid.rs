@@ -1,8 +1,9 @@
 //! The grid of `AprilTags`: tags are found as dark quadrilaterals and read; their numbers say where they lie.
 //!
 //! Numbers may grow upwards (Kalibr) or downwards from row to row: which one, the image tells, because
-//! labels turn in the image as u and v do. So does the turn of the tags, which nothing rests on. The
-//! corners of the tags are then fitted as crossings with the small squares between the tags.
+//! labels turn in the image as u and v do. So it is with the black around the codes, one cell or Kalibr's two.
+//! Nothing rests on the turn of the tags: `OpenCV` prints them upside down. The corners of the tags are then
+//! fitted as crossings with the small squares between the tags.
 
 use super::cells::{Placed, read};
 use super::found::{Found, PrintedTarget};
@@ -16,7 +17,7 @@ use crate::detect::turning::turns_like_image;
 use crate::detect::verdict::{Refusal, why_nothing_found};
 use calib_rays::geometry::PixelPoint;
 use calib_rays::observed::Corner;
-use calib_rays::print::{AprilGrid, Code, Codes, TagOrder};
+use calib_rays::print::{AprilGrid, Code, Codes, TagBorder, TagOrder};
 use nalgebra::{Matrix2, Vector2};
 use std::collections::BTreeMap;
 
@@ -43,14 +44,19 @@ impl Tag {
 impl PrintedTarget for AprilGrid {
     fn find(&self, image: &GrayImage, settings: &DetectSettings) -> Result<Found, Refusal> {
         let quads = quads(image);
-        let placed = placed(self);
         let ids = self.first_id..self.first_id + self.tag_count();
-        let tags = tags(image, &quads, &self.codes, placed, ids);
+        let with = |border: TagBorder| {
+            let placed = placed(self, border);
+            let tags = tags(image, &quads, &self.codes, placed, ids.clone());
+            (border, tags)
+        };
+        let (one, two) = (with(TagBorder::One), with(TagBorder::Two));
+        let (border, tags) = if two.1.len() > one.1.len() { two } else { one };
         if tags.len() < MIN_TAGS {
             return Err(other_tags(image, &quads, self).unwrap_or_else(|| why_nothing_found(image)));
         }
         let rough = rough_corners(self, &tags)?;
-        let crossings = crossings(self);
+        let crossings = crossings(self, border);
         let fitted = saddles::fit(image, &crossings, &rough, settings.max_half_window_px)
             .filter(|fitted| !fitted.is_empty())
             .ok_or(Refusal::TagsWithoutCorners { tags: tags.len() })?;
@@ -60,11 +66,12 @@ impl PrintedTarget for AprilGrid {
 }
 
 /// How a tag's cells lie in its quadrilateral, and the white beside it.
-fn placed(grid: &AprilGrid) -> Placed {
+fn placed(grid: &AprilGrid, border: TagBorder) -> Placed {
     Placed {
         margin: 0.0,
         around: -0.4 * grid.spacing.min(0.4),
         side: grid.codes.side(),
+        border: border.cells(),
     }
 }
 
@@ -205,8 +212,8 @@ fn agreeing(
 }
 
 /// The corners of the tags, and the cells inside them that are none.
-fn crossings(grid: &AprilGrid) -> Crossings {
-    let cell = grid.tag_mm / (grid.codes.side() + 2) as f64;
+fn crossings(grid: &AprilGrid, border: TagBorder) -> Crossings {
+    let border_mm = grid.border_mm(border);
     let gap = grid.spacing * grid.tag_mm;
     let mut all = Vec::new();
     for row in 0..2 * grid.rows {
@@ -223,13 +230,13 @@ fn crossings(grid: &AprilGrid) -> Crossings {
     for row in 0..grid.rows {
         for col in 0..grid.cols {
             let [x, y] = grid.corner_mm(2 * row, 2 * col);
-            let (from, to) = (cell, grid.tag_mm - cell);
+            let (from, to) = (border_mm, grid.tag_mm - border_mm);
             covers.push([x + from, x + to, y + from, y + to]);
         }
     }
     Crossings {
         all,
-        clear: cell.min(gap),
+        clear: border_mm.min(gap),
         reach: (REACH * gap).min(0.5 * grid.tag_mm),
         covers,
     }
@@ -242,14 +249,15 @@ fn other_tags(
     stated: &AprilGrid,
 ) -> Option<Refusal> {
     let of = |codes: Codes| {
-        let placed = Placed {
-            side: codes.side(),
-            ..placed(stated)
+        let with = |border: TagBorder| {
+            let placed = Placed {
+                side: codes.side(),
+                ..placed(stated, border)
+            };
+            let exact = tags(image, quads, &codes, placed, 0..codes.count());
+            exact.iter().filter(|tag| tag.code.wrong_cells == 0).count()
         };
-        let ids = 0..codes.count();
-        let exact = tags(image, quads, &codes, placed, ids);
-        let count = exact.iter().filter(|tag| tag.code.wrong_cells == 0).count();
-        (count, codes)
+        (with(TagBorder::One).max(with(TagBorder::Two)), codes)
     };
     let all = Codes::names().iter().filter_map(|name| Codes::named(name));
     let mut best: Option<(usize, Codes)> = None;

@@ -25,18 +25,21 @@ pub struct Placed {
     /// Where the white around the marker is looked at: a coordinate of the square, and as far from its other
     /// end.
     pub around: f64,
-    /// Cells along the marker's side, without its border of one cell.
+    /// Cells along the marker's side, without its border.
     pub side: usize,
+    /// Cells of its border.
+    pub border: usize,
 }
 
 impl Placed {
-    /// A marker in the middle of its square, `part` of it wide.
+    /// A marker with a border of one cell in the middle of its square, `part` of it wide.
     pub fn centered(part: f64, side: usize) -> Self {
         let margin = (1.0 - part) / 2.0;
         Self {
             margin,
             around: margin / 2.0,
             side,
+            border: 1,
         }
     }
 }
@@ -47,21 +50,25 @@ pub fn read(image: &GrayImage, map: &Homography, placed: Placed) -> Option<Read>
         margin,
         around,
         side,
+        border: border_cells,
     } = placed;
-    let cell = (1.0 - 2.0 * margin) / (side + 2) as f64;
+    let all = side + 2 * border_cells;
+    let cell = (1.0 - 2.0 * margin) / all as f64;
     let value = |x: f64, y: f64| {
         let pixel = map.at(x, y);
         image.between(pixel.x, pixel.y)
     };
     // At the middle of the border's cells, and of the margin beside them.
     let along = |k: usize| margin + (k as f64 + 0.5) * cell;
-    let ends = [along(0), along(side + 1)];
-    let beside = [around, 1.0 - around];
     let (mut border, mut outside) = (Vec::new(), Vec::new());
-    for k in 0..side + 2 {
-        for (end, out) in ends.into_iter().zip(beside) {
-            border.push(value(along(k), end)?);
-            border.push(value(end, along(k))?);
+    for k in 0..all {
+        for ring in 0..border_cells {
+            for end in [along(ring), along(all - 1 - ring)] {
+                border.push(value(along(k), end)?);
+                border.push(value(end, along(k))?);
+            }
+        }
+        for out in [around, 1.0 - around] {
             outside.push(value(along(k), out)?);
             outside.push(value(out, along(k))?);
         }
@@ -84,7 +91,10 @@ pub fn read(image: &GrayImage, map: &Homography, placed: Placed) -> Option<Read>
             let mut sum = 0.0;
             for dy in SAMPLES {
                 for dx in SAMPLES {
-                    sum += value(along(col + 1) + dx * cell, along(row + 1) + dy * cell)?;
+                    sum += value(
+                        along(col + border_cells) + dx * cell,
+                        along(row + border_cells) + dy * cell,
+                    )?;
                 }
             }
             let count = (SAMPLES.len() * SAMPLES.len()) as f64;
