@@ -4,7 +4,6 @@ pub mod cli;
 pub mod compare;
 pub mod demo;
 pub mod device;
-pub mod exchange;
 pub mod methods;
 pub mod pipeline;
 pub mod present;

@@ -7,7 +7,7 @@ use super::match_noise::parse;
 use super::output::Console;
 use super::place::check_results_folder;
 use super::usage_error::UsageError;
-use crate::exchange::dense::array_name;
+use calib_exchange::dense::array_name;
 use crate::methods::{self, Method};
 use crate::pipeline::{CalibrateError, CalibrateSettings, Calibrated};
 use crate::report::facts::Facts;

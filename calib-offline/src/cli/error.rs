@@ -5,7 +5,7 @@ use crate::compare::CompareError;
 use crate::compare::publication::ExperimentError;
 use crate::demo::DemoError;
 use crate::device::DeviceError;
-use crate::exchange::ExchangeError;
+use calib_exchange::ExchangeError;
 use crate::pipeline::{CalibrateError, VerifyError};
 use crate::report::store::CalibrationError;
 use calib_blob::export::ExportError;

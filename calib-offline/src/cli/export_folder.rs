@@ -5,7 +5,7 @@ use super::error::Error;
 use super::place::check_results_folder;
 use super::rig_file::{RigFile, open};
 use super::usage_error::UsageError;
-use crate::exchange::{
+use calib_exchange::{
     Distortion, ExchangeError, Loss, NamedFile, Pinholes, dense, kalibr, nearest_pinholes, opencv,
     ros,
 };

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// ARCHITECTURE.md draws them.
 const FLOORS: [&[&str]; 5] = [
     &["present"],
-    &["device", "exchange", "report"],
+    &["device", "report"],
     &["methods"],
     &["pipeline", "compare", "demo"],
     &["cli"],
@@ -33,7 +33,8 @@ const FINE: [&[&str]; 3] = [
 ];
 
 /// Packages with code of the product, at the top and one folder below it.
-const MOST_PACKAGES: usize = 14;
+// Raised to 16 when the formats of other tools, in and out, became a package.
+const MOST_PACKAGES: usize = 16;
 
 /// What only tests the product.
 const TESTS: [&str; 2] = ["ray-runtime/fuzz", "tests"];
