@@ -7,13 +7,13 @@ use super::match_noise::parse;
 use super::output::Console;
 use super::place::check_results_folder;
 use super::usage_error::UsageError;
-use calib_exchange::dense::array_name;
 use crate::methods::{self, Method};
 use crate::pipeline::{CalibrateError, CalibrateSettings, Calibrated};
 use crate::report::facts::Facts;
 use crate::report::record::{ExpectedError, Grade};
 use crate::report::{BlobFacts, Calibration, html, text};
 use calib_blob::pack::{PackSettings, pack_nearest};
+use calib_exchange::dense::array_name;
 use calib_rays::progress::Progress;
 use calib_recording::atomic_file::{make_folder, write_set};
 use calib_recording::dataset::Dataset;
@@ -58,9 +58,12 @@ With --json, schema calib-offline/calibrate/1; a figure that does not apply is n
                                  and over what was predicted
   central_model_mm               RMS by which a central model would move points; 0 if central
   rms_px, sigma_px
-  cameras (name, sensor_px, covered_share, views, central, centrality_rms_mm, offset_numbers)
-                                 offset_numbers: used, and all
-  baseline_mm, working_distance_mm (least, median, most)
+  cameras (name, sensor_px, covered_share, views, focal_px, principal_point_px, pinhole_rms_px, central,
+    centrality_rms_mm, offset_numbers)
+                                 of the pinhole nearest to the rays: focal lengths, principal point and by how much
+                                 it misses them; offset_numbers: used, and all
+  baseline_mm, axes_angle_deg    from the first camera to each other one, between these pinholes
+  working_distance_mm (least, median, most)
   poses_used, views_used, left_out, corners_used, corners_rejected
   blob (bytes, max_error_px, max_error_mm, wanted_error_px, curve (bytes, error_px, error_mm))
                                  mm at the working distance; larger than wanted only where f32

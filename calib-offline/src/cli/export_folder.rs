@@ -5,12 +5,12 @@ use super::error::Error;
 use super::place::check_results_folder;
 use super::rig_file::{RigFile, open};
 use super::usage_error::UsageError;
+use crate::present::numbers::short;
+use calib_blob::rays::RaySource;
 use calib_exchange::{
     Distortion, ExchangeError, Loss, NamedFile, Pinholes, dense, kalibr, nearest_pinholes, opencv,
     ros,
 };
-use crate::present::numbers::short;
-use calib_blob::rays::RaySource;
 use calib_recording::atomic_file::{check_place, make_folder, write_set};
 use serde::Serialize;
 use std::path::{Path, PathBuf};

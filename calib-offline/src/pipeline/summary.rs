@@ -3,10 +3,13 @@
 use super::left_out::{left_out, renumbered};
 use super::parts::Parts;
 use crate::methods::solution::Solution;
+use crate::report::facts::working_distance;
+use crate::report::nearest_pinhole::NearestPinhole;
 use crate::report::record::{
     Calibration, CameraRecord, CornerRecord, EstimateRecord, HeldOutRecord, PoseRecord, SCHEMA,
     StageAxis,
 };
+use calib_exchange::{Distortion, nearest_pinholes};
 use calib_judge::neighbor_noise::neighbor_noise_mm;
 use calib_judge::verdict::{Figures, judge};
 use calib_judge::{HeldOut, fit_stage_axes};
@@ -31,7 +34,7 @@ pub fn record(parts: &Parts) -> Calibration {
     let summary = estimate_record(solution, &corners);
     let held_out = held_out_record(parts);
     let verdict = judge(&figures(parts, &summary), parts.thresholds).with_causes(parts.causes);
-    Calibration {
+    let mut calibration = Calibration {
         schema: SCHEMA.to_string(),
         tool_version: env!("CARGO_PKG_VERSION").to_string(),
         command: None,
@@ -57,7 +60,27 @@ pub fn record(parts: &Parts) -> Calibration {
         causes: parts.causes.to_vec(),
         task: parts.task.cloned(),
         verdict,
-    }
+        nearest_pinholes: Vec::new(),
+    };
+    calibration.nearest_pinholes = pinholes(&calibration);
+    calibration
+}
+
+/// The cameras as pinholes; none where one of them has no pinhole near it.
+fn pinholes(calibration: &Calibration) -> Vec<NearestPinhole> {
+    let Some(distance) = working_distance(calibration) else {
+        return Vec::new();
+    };
+    let forms = [Distortion::Five, Distortion::Eight];
+    nearest_pinholes(&calibration.rig, distance.median, &forms).map_or_else(
+        |_| Vec::new(),
+        |found| {
+            let cameras = found.cameras.iter();
+            cameras
+                .map(|camera| NearestPinhole::new(camera, found.distance_mm))
+                .collect()
+        },
+    )
 }
 
 fn camera_record(camera: &CameraSpec) -> CameraRecord {

@@ -1,5 +1,6 @@
 //! A made-up but plausible calibration, to develop and test the report with.
 
+use super::nearest_pinhole::NearestPinhole;
 use super::record::{
     BoardShape, Calibration, CameraRecord, Certificate, ChoicesRecord, CornerRecord,
     EstimateRecord, ExpectedOptics, Grade, HeldOutRecord, LeftOut, PoseRecord, RecordingSpec,
@@ -88,6 +89,7 @@ pub fn calibration() -> Calibration {
         board_shape: BoardShape {
             terms: vec![(2, 0, 0.03), (0, 2, -0.02)],
         },
+        nearest_pinholes: pinholes(&rig_from_cameras),
         rig: Rig {
             uncertainty: vec![uncertainty()],
             cameras,
@@ -264,6 +266,23 @@ fn checks() -> CrossChecks {
             ratio_by_chance: [0.546, 1.453],
         }),
     }
+}
+
+/// The nearest pinholes: their frames are those of the fields.
+fn pinholes(rig_from_cameras: &[(&str, RigidTransform)]) -> Vec<NearestPinhole> {
+    let cameras = rig_from_cameras.iter();
+    cameras
+        .map(|(name, rig_from_camera)| NearestPinhole {
+            camera: (*name).to_owned(),
+            rig_from_pinhole: *rig_from_camera,
+            focal_px: [FOCAL_PX, FOCAL_PX + 1.5],
+            principal_point_px: [641.5, 510.75],
+            distortion: vec![-0.1, 0.02, 0.0, 0.0, 0.0],
+            distance_mm: 423.0,
+            rms_px: 0.0613,
+            max_px: 0.212,
+        })
+        .collect()
 }
 
 fn declared_cameras() -> Vec<CameraRecord> {

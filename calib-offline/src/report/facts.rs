@@ -1,6 +1,7 @@
 //! The few numbers that stand at the top of every summary: on the page, on the terminal, in JSON.
 //! Each is read or measured off the record; nothing is estimated here.
 
+use super::nearest_pinhole::NearestPinhole;
 use super::record::{Calibration, Cause, Grade};
 use super::words;
 use calib_judge::central_model::CentralModel;
@@ -37,8 +38,10 @@ pub struct Facts {
     pub sigma_px: f64,
     /// Cameras in the rig's order.
     pub cameras: Vec<CameraFacts>,
-    /// Distance from the first camera to each other one, mm.
+    /// Distance from the first camera to each other one, mm: of the pinholes nearest to their rays, if there are some.
     pub baseline_mm: Vec<f64>,
+    /// Angle of the turn from the first of these pinholes to each other one, degrees; empty without them.
+    pub axes_angle_deg: Vec<f64>,
     /// From the cameras to the boards.
     pub working_distance_mm: Option<Spread>,
     /// Poses used.
@@ -64,6 +67,12 @@ pub struct CameraFacts {
     pub covered_share: f64,
     /// Images used.
     pub views: usize,
+    /// Focal lengths along u and v of the pinhole nearest to its rays, px.
+    pub focal_px: Option<[f64; 2]>,
+    /// Principal point of the same, px.
+    pub principal_point_px: Option<[f64; 2]>,
+    /// RMS distance of its pixels from those of the rays, px.
+    pub pinhole_rms_px: Option<f64>,
     /// Whether all rays meet in one point by construction.
     pub central: bool,
     /// RMS distance of its rays from the point nearest to all, mm; 0 of a central camera.
@@ -90,17 +99,19 @@ impl Facts {
         let held_out = calibration.held_out.as_ref();
         let neighbor_percent = held_out.and_then(|h| h.neighbor_rms_percent);
         let cameras = &calibration.rig.cameras;
-        let views: BTreeSet<(usize, usize)> = calibration
-            .corners
-            .iter()
-            .map(|c| (c.camera_idx, c.pose))
-            .collect();
+        let views = views(calibration);
         let checks = calibration.checks.as_ref();
         let halves = checks.and_then(|checks| match &checks.half_data {
             HalfDataCheck::Compared(halves) => Some(halves),
             HalfDataCheck::Skipped(_) => None,
         });
         let choices = calibration.choices.as_ref();
+        let all = calibration.nearest_pinholes.as_slice();
+        let pinholes = if all.len() == cameras.len() { all } else { &[] };
+        let pairs = |of: fn(&NearestPinhole, &NearestPinhole) -> f64| -> Vec<f64> {
+            let others = pinholes.iter().skip(1);
+            others.map(|other| of(&pinholes[0], other)).collect()
+        };
         let place = |k: usize| cameras[k].rig_from_camera.translation_mm;
         Self {
             verdict: calibration.verdict.grade,
@@ -128,6 +139,9 @@ impl Facts {
                     sensor_px: [camera.field.sensor.width, camera.field.sensor.height],
                     covered_share: camera.coverage.covered_share(),
                     views: views.iter().filter(|(c, _)| *c == camera_idx).count(),
+                    focal_px: pinholes.get(camera_idx).map(|p| p.focal_px),
+                    principal_point_px: pinholes.get(camera_idx).map(|p| p.principal_point_px),
+                    pinhole_rms_px: pinholes.get(camera_idx).map(|p| p.rms_px),
                     central: camera.field.is_central(),
                     centrality_rms_mm: checks
                         .and_then(|checks| checks.centrality.get(camera_idx))
@@ -137,10 +151,18 @@ impl Facts {
                         .map(|numbers| (numbers.effective, numbers.all)),
                 })
                 .collect(),
-            baseline_mm: (1..cameras.len())
-                .map(|k| (place(k) - place(0)).norm())
+            baseline_mm: if pinholes.is_empty() {
+                (1..cameras.len())
+                    .map(|k| (place(k) - place(0)).norm())
+                    .collect()
+            } else {
+                pairs(NearestPinhole::baseline_mm)
+            },
+            axes_angle_deg: pairs(NearestPinhole::turn_rad)
+                .into_iter()
+                .map(f64::to_degrees)
                 .collect(),
-            working_distance_mm: working_distance(calibration, &views),
+            working_distance_mm: working_distance(calibration),
             poses_used: pose_count(calibration),
             views_used: views.len(),
             left_out: calibration.left_out.len(),
@@ -150,6 +172,21 @@ impl Facts {
     }
 }
 
+/// The first camera and another one, `k` places after the next, in words.
+pub fn pair(facts: &Facts, k: usize) -> String {
+    let name = |idx: usize| facts.cameras.get(idx).map_or("", |c| c.name.as_str());
+    let turn = facts.axes_angle_deg.get(k).map_or(String::new(), |angle| {
+        format!(", turned by {angle:.3}\u{b0} (nearest pinholes)")
+    });
+    format!("from {} to {}{turn}", name(0), name(k + 1))
+}
+
+/// Camera and pose of every image used.
+fn views(calibration: &Calibration) -> BTreeSet<(usize, usize)> {
+    let corners = calibration.corners.iter();
+    corners.map(|c| (c.camera_idx, c.pose)).collect()
+}
+
 /// Different poses: one whose views were split has a record for each.
 fn pose_count(calibration: &Calibration) -> usize {
     let poses: BTreeSet<usize> = calibration.poses.iter().map(|p| p.pose).collect();
@@ -157,7 +194,8 @@ fn pose_count(calibration: &Calibration) -> usize {
 }
 
 /// From each camera to the middle of each board it saw.
-fn working_distance(calibration: &Calibration, views: &BTreeSet<(usize, usize)>) -> Option<Spread> {
+pub fn working_distance(calibration: &Calibration) -> Option<Spread> {
+    let views = views(calibration);
     let center_in_board = calibration.board.center_in_board();
     let mut distances: Vec<f64> = calibration
         .poses

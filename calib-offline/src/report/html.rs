@@ -3,7 +3,7 @@
 use super::BlobFacts;
 use super::causes_page;
 use super::choices_page;
-use super::facts::Facts;
+use super::facts::{Facts, pair};
 use super::left_out_page;
 use super::plot::{
     Figure, blob_curve, cost, coverage, histogram, pose_rms, residual_vectors, scene,
@@ -111,8 +111,8 @@ fn headline(calibration: &Calibration, facts: &Facts, blob: Option<&BlobFacts>) 
             }
             (card("Corner noise", &px(facts.sigma_px), "standard deviation per axis, robust estimate"))
             (card("Residual", &px(facts.rms_px), &format!("RMS residual vector of the {} corners used", facts.corners_used)))
-            @for (camera, baseline_mm) in facts.cameras.iter().skip(1).zip(&facts.baseline_mm) {
-                (card("Baseline", &format!("{baseline_mm:.2} mm"), &format!("{} to {}: check it with a ruler", facts.cameras[0].name, camera.name)))
+            @for (k, baseline_mm) in facts.baseline_mm.iter().enumerate() {
+                (card("Baseline", &format!("{baseline_mm:.2} mm"), &pair(facts, k)))
             }
             @if let Some(distance) = facts.working_distance_mm {
                 (card("Working distance", &format!("{:.0} mm", distance.median), &format!("camera to board, {:.0} to {:.0} mm", distance.least, distance.most)))
@@ -125,6 +125,13 @@ fn headline(calibration: &Calibration, facts: &Facts, blob: Option<&BlobFacts>) 
                     &format!("{:.0} %", 100.0 * camera.covered_share),
                     &format!("of {} x {} px calibrated, {} images{}", camera.sensor_px[0], camera.sensor_px[1], camera.views, if camera.central { "" } else { ", non-central" }),
                 ))
+                @if let (Some([fx, fy]), Some([cx, cy]), Some(rms_px)) = (camera.focal_px, camera.principal_point_px, camera.pinhole_rms_px) {
+                    (card(
+                        &format!("Nearest pinhole of {}", camera.name),
+                        &format!("{fx:.1} px"),
+                        &format!("focal length along u, {fy:.1} along v; principal point ({cx:.1}, {cy:.1}); {} px RMS from the rays", short(rms_px)),
+                    ))
+                }
             }
             @if let Some(blob) = blob {
                 (card("Blob", &format!("{} kB", short(blob.bytes as f64 / 1000.0)), &blob.warning().unwrap_or_else(|| format!("{} bytes, within {} px of the calibration", blob.bytes, short(blob.max_error_px)))))

@@ -6,6 +6,7 @@ mod choices_page;
 pub mod facts;
 pub mod html;
 pub mod left_out_page;
+pub mod nearest_pinhole;
 pub mod plot;
 mod procedure;
 pub mod record;

@@ -1,5 +1,6 @@
 //! `calibration.json`: everything a calibration found, versioned, enough to draw every figure again.
 
+use super::nearest_pinhole::NearestPinhole;
 use calib_estimate::alternating::estimate::{PlacementCircles, StartCost};
 use calib_estimate::alternating::spread::SpreadChoice;
 use calib_estimate::joint::{Choice, SmoothnessFound};
@@ -62,6 +63,10 @@ pub struct Calibration {
     pub board_shape: BoardShape,
     /// The calibrated cameras.
     pub rig: Rig,
+    /// Each camera as the pinhole that comes nearest to its rays at the median working distance: frames in which
+    /// baselines and angles compare with those of other tools. Empty where a camera has none, and in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub nearest_pinholes: Vec<NearestPinhole>,
     /// Every pose used. A pose whose views do not show the board in the same place has one record
     /// for each place.
     pub poses: Vec<PoseRecord>,

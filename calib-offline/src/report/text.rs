@@ -1,7 +1,7 @@
 //! The summary for a terminal: what stands on the page's first screen.
 
 use super::BlobFacts;
-use super::facts::Facts;
+use super::facts::{Facts, pair};
 use super::procedure;
 use super::record::{Calibration, Grade};
 use super::task;
@@ -46,6 +46,9 @@ pub fn summary(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
         if let Some(model) = words::camera_model(calibration, camera_idx) {
             lines.push(("", model));
         }
+        if let Some(pinhole) = calibration.nearest_pinholes.get(camera_idx) {
+            lines.push(("", words::nearest_pinhole(pinhole)));
+        }
     }
     if let Some(checks) = &calibration.checks {
         lines.push(("central model", words::central_model(&checks.central_model)));
@@ -56,14 +59,9 @@ pub fn summary(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
         }
         lines.push(("noise", words::noise(choices)));
     }
-    for (camera, baseline_mm) in facts.cameras.iter().skip(1).zip(&facts.baseline_mm) {
-        lines.push((
-            "baseline",
-            format!(
-                "{baseline_mm:.2} mm from {} to {}",
-                facts.cameras[0].name, camera.name
-            ),
-        ));
+    for (k, baseline_mm) in facts.baseline_mm.iter().enumerate() {
+        let between = pair(&facts, k);
+        lines.push(("baseline", format!("{baseline_mm:.2} mm {between}")));
     }
     if let Some(distance) = facts.working_distance_mm {
         lines.push((

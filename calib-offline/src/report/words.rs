@@ -1,5 +1,6 @@
 //! Choices and checks of the record in plain words, for the terminal and the page alike.
 
+use super::nearest_pinhole::NearestPinhole;
 use super::record::{Calibration, ChoicesRecord};
 use crate::present::numbers::short;
 use calib_estimate::joint::{Alternative, Choice, Family};
@@ -111,6 +112,17 @@ pub fn central_model(found: &CentralModel) -> String {
         }
         CentralModel::NoEstimate => "not known: without offsets there is no estimate".to_owned(),
     }
+}
+
+/// A camera as a pinhole.
+pub fn nearest_pinhole(pinhole: &NearestPinhole) -> String {
+    let [fx, fy] = pinhole.focal_px;
+    let [cx, cy] = pinhole.principal_point_px;
+    format!(
+        "nearest pinhole: focal lengths {fx:.2} and {fy:.2} px, principal point ({cx:.2}, {cy:.2}), {} px RMS from the rays (most {})",
+        short(pinhole.rms_px),
+        short(pinhole.max_px)
+    )
 }
 
 /// A change of the evidence, without the sign of a negative zero.

@@ -182,6 +182,7 @@ pub fn with_uncertainty() -> Calibration {
 /// A calibration that says no more than what the rig is.
 pub fn calibration() -> Calibration {
     Calibration {
+        nearest_pinholes: Vec::new(),
         schema: SCHEMA.to_owned(),
         tool_version: "0.0.0".to_owned(),
         command: None,
