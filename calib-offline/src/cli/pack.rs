@@ -1,16 +1,14 @@
 //! `pack`: a calibration to a blob within a proven error.
 
 use super::Outcome;
-use super::calibrate::{blob_max_error_px, pack_settings};
+use super::calibrate::{blob_max_error_px, pack_settings, watched};
 use super::error::Error;
 use super::match_noise::parse;
 use super::output::Console;
 use super::place::check_file;
 use crate::present::numbers::short;
-use crate::report::Calibration;
-use calib_blob::pack::{
-    CurvePoint, Deviation, LOOSEST_PX, PackSettings, Prefer, pack, pack_within_bytes,
-};
+use crate::report::{BlobFacts, Calibration};
+use calib_blob::pack::{CurvePoint, Deviation, LOOSEST_PX, PackSettings, Prefer};
 use calib_recording::atomic_file;
 use clap::{Args, ValueEnum};
 use ray_runtime::format::{Form, MAGIC};
@@ -54,7 +52,7 @@ pub struct PackArgs {
     /// Where to write the blob
     #[arg(short, long, value_name = "RIG.rays")]
     pub output: PathBuf,
-    /// No ray may be further off than this, px [default: 0.001, or what fits into --max-bytes]
+    /// No ray may be further off than this, px [default: as calibrate packs, or what fits into --max-bytes]
     #[arg(long, value_name = "E")]
     pub max_error_px: Option<f64>,
     /// The blob may have no more bytes than this
@@ -126,7 +124,6 @@ struct PairObject {
 pub fn run(args: &PackArgs, console: &Console) -> Result<Outcome, Error> {
     check_file(&args.output, &MAGIC, &[&args.calibration], args.force)?;
     let mut calibration = Calibration::load(&args.calibration)?;
-    console.progress().begin("packing the blob", 0);
     let default_px = match args.max_bytes {
         Some(_) => LOOSEST_PX,
         None => blob_max_error_px(&calibration),
@@ -143,15 +140,18 @@ pub fn run(args: &PackArgs, console: &Console) -> Result<Outcome, Error> {
     let rig = &mut calibration.rig;
     rig.match_noise_px = args.match_noise_px.or(rig.match_noise_px);
     let rig = &*rig;
-    let packed = match args.max_bytes {
-        Some(max_bytes) if args.max_error_px.is_none() => {
-            pack_within_bytes(rig, &settings, max_bytes)
-        }
-        Some(max_bytes) => pack(rig, &settings).and_then(|packed| packed.within(max_bytes)),
-        None => pack(rig, &settings),
-    };
-    console.progress().end();
-    let packed = packed?;
+    let packed = watched(rig, &settings, console, |packer| match args.max_bytes {
+        Some(max_bytes) if args.max_error_px.is_none() => packer.within_bytes(max_bytes),
+        Some(max_bytes) => packer.within(max_error_px)?.within(max_bytes),
+        // A bound that nobody asked for is no reason to have no blob.
+        None if args.max_error_px.is_none() => packer.nearest(),
+        None => packer.within(max_error_px),
+    })?;
+    if args.max_bytes.is_none()
+        && let Some(warning) = BlobFacts::new(&packed, max_error_px).warning()
+    {
+        console.warn(&warning);
+    }
     atomic_file::write(&args.output, &packed.bytes)?;
     let object = PackObject {
         schema: "calib-offline/pack/2",

@@ -11,11 +11,11 @@ use ray_runtime::{MatchNoise, OpenError};
 use serde::Serialize;
 
 /// What stands in a blob besides cameras and grids.
-pub struct BlobParts<'a> {
+pub struct BlobParts {
     /// See [`Meta`].
     pub identity: [u8; IDENTITY_LEN],
     /// See [`Meta`].
-    pub frame: &'a str,
+    pub frame: String,
     /// See [`Meta`].
     pub max_error_px: f32,
     /// See [`Meta`].
@@ -28,7 +28,7 @@ pub struct BlobParts<'a> {
     pub match_noise: Option<MatchNoise>,
 }
 
-impl BlobParts<'_> {
+impl BlobParts {
     /// The blob of these cameras; `tables` in their order.
     ///
     /// # Errors
@@ -98,7 +98,7 @@ impl BlobParts<'_> {
     fn metadata(&self, cameras: &[(&CalibratedCamera, &Table)]) -> Result<Vec<u8>, PackError> {
         let meta = Meta {
             identity: &self.identity,
-            frame: self.frame,
+            frame: &self.frame,
             written_by: concat!("calib-offline ", env!("CARGO_PKG_VERSION")),
             pixel_convention: PixelConvention::TopLeftPixelCenter,
             length_unit: LengthUnit::Millimeter,

@@ -2,7 +2,8 @@
 //!
 //! Each camera's ray field becomes a table, of cubic patches (`patches`) or of a polynomial and
 //! quantized knots (`quantized`, over `monomials` and `residual_spline`): the smallest that holds the bound
-//! (`search`). The bytes are laid out by the runtime's own schema (`encode`); and every pixel of the
+//! (`search`, over `sizes`). No table is made, sampled or proven twice (`trials`), and what all of them may cost is
+//! bounded (`work`). The bytes are laid out by the runtime's own schema (`encode`); and every pixel of the
 //! calibrated area, quarter pixels along its edge too, is looked up in those bytes by the real runtime and
 //! compared with the f64 field (`proof`). The largest difference is written into the blob. What is
 //! known of the rays' uncertainty goes with it, on a coarse grid (`uncertainty`) whose predictions are
@@ -10,13 +11,14 @@
 
 mod aligned_bytes;
 mod blob_error;
-mod bound;
+mod curve;
 mod encode;
 mod error;
 mod field_rows;
 mod monomials;
 mod nearest;
 mod packed;
+mod packer;
 mod patches;
 mod proof;
 mod quantized;
@@ -25,18 +27,24 @@ mod search;
 mod self_test;
 mod settings;
 mod sigma_error;
+mod sizes;
 mod table;
+mod trials;
 mod uncertainty;
+mod work;
 
 pub use aligned_bytes::{AlignedBytes, read_aligned};
 pub use blob_error::BlobError;
-pub use bound::pack;
 pub use error::PackError;
-pub use nearest::{LOOSEST_PX, pack_nearest, pack_within_bytes};
+pub use nearest::{LOOSEST_PX, pack, pack_nearest, pack_within_bytes};
 pub use packed::{CurvePoint, Packed, PackedTable, Tried};
+pub use packer::Packer;
 pub use proof::Proof;
 pub use settings::{PackSettings, Prefer};
 pub use sigma_error::{Deviation, PackedPair};
+pub use work::Work;
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod work_tests;

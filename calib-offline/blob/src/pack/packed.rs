@@ -3,6 +3,7 @@
 use super::error::PackError;
 use super::proof::Proof;
 use super::sigma_error::PackedPair;
+use super::work::Work;
 use ray_runtime::format::Encoding;
 use serde::Serialize;
 
@@ -22,6 +23,8 @@ pub struct Packed {
     /// What other sizes would cost. From small to large; each holds a smaller error than the one
     /// before. The errors are those of a sample of the pixels.
     pub curve: Vec<CurvePoint>,
+    /// What the search cost.
+    pub work: Work,
 }
 
 impl Packed {

@@ -5,6 +5,7 @@ use super::field_rows::FieldRows;
 use calib_rays::field::{CalibratedCamera, FieldSample, transport};
 use calib_rays::geometry::PixelPoint;
 use calib_rays::numerics::median;
+use calib_rays::progress::Progress;
 use nalgebra::{Matrix2, Vector2, Vector3};
 use ray_runtime::RayBlob;
 use rayon::prelude::*;
@@ -32,10 +33,10 @@ pub struct Proof {
 /// Compares every `stride`-th pixel along both axes (1: all).
 pub fn prove(
     camera: &CalibratedCamera,
-    blob: &RayBlob<'_>,
-    camera_idx: usize,
+    (blob, camera_idx): (&RayBlob<'_>, usize),
     working_distance_mm: f64,
     stride: usize,
+    progress: &dyn Progress,
 ) -> Proof {
     let sensor = camera.field.sensor;
     let columns: Vec<u32> = strided(sensor.width, stride).collect();
@@ -52,7 +53,11 @@ pub fn prove(
                 let pixel = PixelPoint::new(f64::from(u), f64::from(v));
                 judge.compare(pixel, || row.sample(k))
             });
-            compared.fold(Proof::empty(), Proof::merged)
+            let proof = compared.fold(Proof::empty(), Proof::merged);
+            if v > 0 && v.is_multiple_of(ROWS_PER_STEP) {
+                progress.advance();
+            }
+            proof
         })
         .collect::<Vec<_>>()
         .into_iter()
@@ -115,6 +120,9 @@ pub fn prove_edges(
         .into_iter()
         .fold(Proof::empty(), Proof::merged)
 }
+
+/// Rows that are one step of progress.
+const ROWS_PER_STEP: u32 = 256;
 
 /// f32 holds quarter pixels exactly.
 const QUARTER_PX: f64 = 0.25;

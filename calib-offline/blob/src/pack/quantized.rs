@@ -11,7 +11,7 @@ use ray_runtime::format::{
 };
 
 /// Bytes of a knot's number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Number {
     /// No knots: the polynomial alone.
     None,
@@ -52,21 +52,24 @@ pub struct Predictors<'a> {
     target: Target<'a>,
     equations: Vec<Equation>,
     offset: Option<OffsetPredictor>,
+    /// Largest misfit of the offset's polynomial of each degree that was asked for so far, mm.
+    offset_errors_mm: Vec<f64>,
 }
 
 /// The polynomial of an offset field.
-struct OffsetPredictor {
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct OffsetPredictor {
     degree: usize,
     /// Whether it does without knots.
     is_enough: bool,
 }
 
 impl<'a> Predictors<'a> {
-    /// Samples a camera's field, and chooses the polynomial of its offset for a bound in mm.
+    /// Samples a camera's field. Before tables are asked for, [`set_bound`](Self::set_bound).
     ///
     /// # Errors
     /// [`PackError::Field`].
-    pub fn new(camera: &'a CalibratedCamera, max_error_mm: f64) -> Result<Self, PackError> {
+    pub fn new(camera: &'a CalibratedCamera) -> Result<Self, PackError> {
         let sensor = camera.field.sensor;
         let target = Target::new(camera);
         let spacing_px = f64::from(sensor.width.max(sensor.height) - 1).max(1.0)
@@ -89,39 +92,60 @@ impl<'a> Predictors<'a> {
                 }
             }
         }
-        let mut predictors = Self {
+        Ok(Self {
             camera,
             target,
             equations,
             offset: None,
-        };
-        if !camera.field.is_central() {
-            predictors.offset = Some(predictors.offset_predictor(OFFSET_SHARE * max_error_mm));
-        }
-        Ok(predictors)
+            offset_errors_mm: Vec::new(),
+        })
     }
 
-    /// The lowest degree that stays within a limit everywhere, or else the cubic and knots.
-    fn offset_predictor(&self, limit_mm: f64) -> OffsetPredictor {
-        let holds = |degree: usize| {
-            let coefficients = monomials::fit(&self.equations, degree, 0.0)?;
-            let holds = self.equations.iter().all(|equation| {
-                let found = evaluate(&coefficients, degree, equation.at);
-                let error = [2, 3].map(|c| found[c] - equation.value[c]);
-                error[0].hypot(error[1]) <= limit_mm
-            });
-            holds.then_some(degree)
-        };
-        let enough = (0..=MAX_DEGREE.into()).find_map(holds);
-        OffsetPredictor {
+    /// Chooses the polynomial of the offset for a bound in mm: the lowest degree that stays within its
+    /// share of it everywhere, or else the cubic and knots.
+    pub fn set_bound(&mut self, max_error_mm: f64) {
+        if self.camera.field.is_central() {
+            return;
+        }
+        let limit_mm = OFFSET_SHARE * max_error_mm;
+        let enough =
+            (0..=MAX_DEGREE.into()).find(|degree| self.offset_error_mm(*degree) <= limit_mm);
+        self.offset = Some(OffsetPredictor {
             degree: enough.unwrap_or(DEFAULT_OFFSET_DEGREE),
             is_enough: enough.is_some(),
+        });
+    }
+
+    /// What tables depend on besides their plan; `None` for a central camera.
+    pub fn offset(&self) -> Option<OffsetPredictor> {
+        self.offset
+    }
+
+    /// Largest misfit of the offset's polynomial of a degree; infinite if there is none.
+    fn offset_error_mm(&mut self, degree: usize) -> f64 {
+        for next in self.offset_errors_mm.len()..=degree {
+            let worst = monomials::fit(&self.equations, next, 0.0).map_or(f64::INFINITY, |found| {
+                let errors = self.equations.iter().map(|equation| {
+                    let found = evaluate(&found, next, equation.at);
+                    let error = [2, 3].map(|c| found[c] - equation.value[c]);
+                    error[0].hypot(error[1])
+                });
+                errors.fold(0.0, |worst, error| {
+                    if error.is_nan() {
+                        f64::INFINITY
+                    } else {
+                        error.max(worst)
+                    }
+                })
+            });
+            self.offset_errors_mm.push(worst);
         }
+        self.offset_errors_mm[degree]
     }
 
     /// Bytes of the table with a direction polynomial of this degree and these knots.
     pub fn byte_count(&self, degree: u8, number: Number, cells: [u32; 2]) -> usize {
-        let header = self.header(degree, number, [0.0; 2], cells);
+        let header = self.header(degree, number, [0.0; 2], cells, self.offset);
         header.layout(cells).offset_knots_end
     }
 
@@ -131,6 +155,7 @@ impl<'a> Predictors<'a> {
         number: Number,
         [step, offset_step]: [f64; 2],
         cells: [u32; 2],
+        offset: Option<OffsetPredictor>,
     ) -> QuantizedHeader {
         let sensor = self.camera.field.sensor;
         let map = |degree, number: Number, step: f64| QuantizedMap {
@@ -139,33 +164,31 @@ impl<'a> Predictors<'a> {
             unit: (step / f64::from(UNITS_PER_STEP)) as f32,
         };
         let direction = map(degree, number, step);
-        let offset = self.offset.as_ref().map(|offset| {
-            let number = self.offset_number(number);
+        let offset = offset.map(|offset| {
+            let number = offset_number(Some(offset), number);
             map(offset.degree as u8, number, offset_step)
         });
         QuantizedHeader::new(direction, offset, [sensor.width, sensor.height], cells)
     }
 
-    /// The knots of the offset, beside those of the direction.
-    fn offset_number(&self, number: Number) -> Number {
-        match &self.offset {
-            Some(offset) if !offset.is_enough && number != Number::None => Number::Two,
-            _ => Number::None,
-        }
-    }
-
-    /// The table with a direction polynomial of this degree and these knots.
+    /// The table with a direction polynomial of this degree, these knots, and this polynomial of the offset.
     ///
     /// # Errors
     /// [`PackError::Fit`].
-    pub fn table(&self, degree: u8, number: Number, cells: [u32; 2]) -> Result<Table, PackError> {
+    pub fn table(
+        &self,
+        degree: u8,
+        number: Number,
+        cells: [u32; 2],
+        offset_predictor: Option<OffsetPredictor>,
+    ) -> Result<Table, PackError> {
         let not_fitted = || PackError::Fit {
             camera: self.camera.name.clone(),
             cells,
         };
         let direction =
             monomials::fit(&self.equations, degree.into(), 0.0).ok_or_else(not_fitted)?;
-        let offset_degree = self.offset.as_ref().map(|offset| offset.degree);
+        let offset_degree = offset_predictor.map(|offset| offset.degree);
         let offset = match offset_degree {
             Some(degree) => monomials::fit(&self.equations, degree, 0.0).ok_or_else(not_fitted)?,
             None => Vec::new(),
@@ -186,13 +209,13 @@ impl<'a> Predictors<'a> {
             };
             Some(spline.fit(predicted)?)
         };
-        let offset_number = self.offset_number(number);
+        let offset_number = offset_number(offset_predictor, number);
         let step = |channels: [usize; 2], number: Number| match &knots {
             Some(knots) if number != Number::None => knots.largest(channels) / number.largest(),
             _ => 0.0,
         };
         let steps = [step([0, 1], number), step([2, 3], offset_number)];
-        let header = self.header(degree, number, steps, cells);
+        let header = self.header(degree, number, steps, cells, offset_predictor);
         let layout = header.layout(cells);
 
         let mut bytes = header.to_bytes().to_vec();
@@ -207,11 +230,19 @@ impl<'a> Predictors<'a> {
         Ok(Table {
             encoding: Encoding {
                 form: Form::Quantized,
-                is_central: self.offset.is_none(),
+                is_central: offset_predictor.is_none(),
             },
             cells,
             bytes,
         })
+    }
+}
+
+/// The knots of the offset, beside those of the direction.
+fn offset_number(offset: Option<OffsetPredictor>, number: Number) -> Number {
+    match offset {
+        Some(offset) if !offset.is_enough && number != Number::None => Number::Two,
+        _ => Number::None,
     }
 }
 

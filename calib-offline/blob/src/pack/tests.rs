@@ -6,6 +6,7 @@ use calib_rays::field::{
     BaseLens, CalibratedCamera, CoverageMask, Projection, RayField, Rig, SmoothMap,
 };
 use calib_rays::geometry::{PixelPoint, RigidTransform, SensorSize, so3};
+use calib_rays::progress::Silent;
 use nalgebra::{Vector2, Vector3};
 use ray_runtime::{OpenError, RayBlob};
 
@@ -20,7 +21,7 @@ fn toed_in(x_mm: f64, distance_mm: f64) -> RigidTransform {
     RigidTransform::new(yaw * so3::exp(&Vector3::new(0.02, 0.0, 0.01)), translation)
 }
 
-fn camera(name: &str, field: RayField, rig_from_camera: RigidTransform) -> CalibratedCamera {
+pub fn camera(name: &str, field: RayField, rig_from_camera: RigidTransform) -> CalibratedCamera {
     CalibratedCamera {
         name: name.into(),
         coverage: CoverageMask::uniform(field.sensor, true),
@@ -100,7 +101,7 @@ pub fn fisheye_camera() -> CalibratedCamera {
     fisheye
 }
 
-fn rig(cameras: Vec<CalibratedCamera>) -> Rig {
+pub fn rig(cameras: Vec<CalibratedCamera>) -> Rig {
     Rig {
         uncertainty: Vec::new(),
         cameras,
@@ -110,7 +111,7 @@ fn rig(cameras: Vec<CalibratedCamera>) -> Rig {
     }
 }
 
-fn settings(max_error_px: f64) -> PackSettings {
+pub fn settings(max_error_px: f64) -> PackSettings {
     PackSettings {
         max_error_px,
         working_distance_mm: 600.0,
@@ -314,14 +315,20 @@ fn six_thousand_pixels_are_within_a_thousandth() {
     let table = patches::fit(&big, [41, 27]).unwrap();
     let bytes = parts().encode_cameras(&[(&big, &table)]).unwrap();
     let bytes = AlignedBytes::from(bytes.as_slice());
-    let proof = proof::prove(&big, &RayBlob::open(&bytes).unwrap(), 0, 600.0, 5);
+    let proof = proof::prove(
+        &big,
+        (&RayBlob::open(&bytes).unwrap(), 0),
+        600.0,
+        5,
+        &Silent,
+    );
     assert!(proof.worst_error_px < 0.001, "{proof:?}");
 }
 
-fn parts() -> encode::BlobParts<'static> {
+pub fn parts() -> encode::BlobParts {
     encode::BlobParts {
         identity: [0; 16],
-        frame: "test",
+        frame: "test".into(),
         max_error_px: 1.0,
         working_distance_mm: 600.0,
         self_tests: Vec::new(),
@@ -339,7 +346,13 @@ fn the_proof_finds_an_error_that_was_put_in() {
     let prove_as = |truth: &CalibratedCamera| {
         let bytes = parts().encode_cameras(&[(&exact, &table)]).unwrap();
         let bytes = AlignedBytes::from(bytes.as_slice());
-        proof::prove(truth, &RayBlob::open(&bytes).unwrap(), 0, 600.0, 9)
+        proof::prove(
+            truth,
+            (&RayBlob::open(&bytes).unwrap(), 0),
+            600.0,
+            9,
+            &Silent,
+        )
     };
     assert!(prove_as(&exact).worst_error_px < 0.0005);
 
