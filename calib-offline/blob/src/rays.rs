@@ -1,6 +1,6 @@
 //! Whoever knows a camera's rays: a calibration in f64, or a blob with the device's own code.
 
-use calib_rays::field::Rig;
+use calib_rays::field::{PairUncertainty, Rig};
 use calib_rays::geometry::{PixelPoint, Ray, RigidTransform, SensorSize};
 use ray_runtime::RayBlob;
 
@@ -23,6 +23,16 @@ pub trait RaySource: Sync {
     /// What a pixel sees: rig frame, mm, unit direction, the origin at the foot point of the camera's reference point;
     /// `None` outside the calibrated area.
     fn ray(&self, camera_idx: usize, pixel: PixelPoint) -> Option<Ray>;
+
+    /// The rectangle of pixels that is asked for, upper left and lower right corner; `None` for whole sensors.
+    fn region(&self) -> Option<[PixelPoint; 2]> {
+        None
+    }
+
+    /// What is known of the uncertainty of pairs; a blob keeps it to itself.
+    fn uncertainty(&self) -> Vec<PairUncertainty> {
+        Vec::new()
+    }
 }
 
 impl RaySource for Rig {
@@ -40,6 +50,10 @@ impl RaySource for Rig {
     fn ray(&self, camera_idx: usize, pixel: PixelPoint) -> Option<Ray> {
         let ray = self.cameras.get(camera_idx)?.ray_in_rig(pixel)?;
         Some(with_unit_direction(ray))
+    }
+
+    fn uncertainty(&self) -> Vec<PairUncertainty> {
+        self.uncertainty.clone()
     }
 }
 

@@ -31,26 +31,26 @@ static GOLDEN: [(&str, &Aligned<[u8]>); 4] = [
 
 const HEADER: &str = include_str!("../../c/rays.h");
 /// As strict as a C compiler gets.
-const WARNINGS: [&str; 4] = ["-Wall", "-Wextra", "-Wpedantic", "-Werror"];
+pub(super) const WARNINGS: [&str; 4] = ["-Wall", "-Wextra", "-Wpedantic", "-Werror"];
 
-fn root() -> PathBuf {
+pub(super) fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
         .unwrap()
         .to_owned()
 }
 
-fn c_folder() -> PathBuf {
+pub(super) fn c_folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("c")
 }
 
 /// A file that a test makes.
-fn made(name: &str) -> PathBuf {
+pub(super) fn made(name: &str) -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR")).join(name)
 }
 
 /// What a command printed, which must succeed.
-fn succeed(command: &mut Command) -> String {
+pub(super) fn succeed(command: &mut Command) -> String {
     let output = run(command);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(
@@ -69,7 +69,7 @@ fn run(command: &mut Command) -> Output {
 
 /// Builds the library for the host, in a target folder of its own and without what the cargo that
 /// runs this test left in the environment.
-fn build_for_host(name: &str, more: &[&str]) -> PathBuf {
+pub(super) fn build_for_host(name: &str, more: &[&str]) -> PathBuf {
     // One at a time: each build puts its library in the same place.
     static BUILDING: Mutex<()> = Mutex::new(());
     let _building = BUILDING.lock().unwrap_or_else(PoisonError::into_inner);
@@ -211,7 +211,7 @@ fn field(answer: Result<Vec<f32>, u8>) -> String {
 }
 
 /// Compares what a program printed for each golden blob with what Rust computes here.
-fn check_bits(mut print: impl FnMut(&Path) -> String) {
+pub(super) fn check_bits(mut print: impl FnMut(&Path) -> String) {
     for (name, bytes) in GOLDEN {
         let printed = print(&root().join("data/golden").join(name));
         let (expected, points) = expected(&RayBlob::open(&bytes.0).unwrap());

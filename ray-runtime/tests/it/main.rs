@@ -1,6 +1,7 @@
 //! The runtime from outside: golden blobs, blobs made by hand and damaged ones, and its C interface.
 
 mod c_interface;
+mod cpp_interface;
 mod damage;
 mod document;
 mod golden;

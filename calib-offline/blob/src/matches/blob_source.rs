@@ -9,6 +9,8 @@ use ray_runtime::{MatchNoise, Measurement, PixelPoint, RayBlob};
 pub struct BlobSource<'a> {
     blob: &'a RayBlob<'a>,
     noise: Option<MatchNoise>,
+    /// Whether it carries the uncertainty of any two cameras.
+    is_uncertain: bool,
     /// Turned about the origin after subtracting the camera's place.
     rig_from_frame: Option<ray_runtime::RigFromCamera>,
 }
@@ -24,6 +26,7 @@ impl<'a> BlobSource<'a> {
         Some(Self {
             blob,
             noise: None,
+            is_uncertain: blob.uncertain_pairs().next().is_some(),
             rig_from_frame,
         })
     }
@@ -41,6 +44,14 @@ impl<'a> BlobSource<'a> {
         b: Sighting<f32>,
     ) -> Result<Measurement, ray_runtime::MeasureError> {
         let (a, b) = (pixel(a), pixel(b));
+        if !self.is_uncertain {
+            // The same bits, without the derivatives.
+            return Ok(Measurement {
+                found: self.blob.triangulate(a, b)?,
+                is_second_above: false,
+                covariance: None,
+            });
+        }
         match self.noise {
             Some(noise) => self.blob.triangulate_with_noise(a, b, noise),
             None => self.blob.triangulate_with_covariance(a, b),

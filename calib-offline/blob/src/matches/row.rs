@@ -1,5 +1,6 @@
 //! One line of `MATCHES.csv` to one line of `POINTS.csv`, without allocating.
 
+use super::decimal;
 use super::error::{RowProblem, shortened};
 use super::header::Columns;
 use calib_rays::measure::{Number, Point, Sighting, Status};
@@ -35,6 +36,41 @@ pub(super) fn parse<'a, N: Number>(
         (have @ (0 | 1), 2..) => Err(RowProblem::TooFewPixels { have }),
         _ => Ok(id),
     }
+}
+
+/// The id of the row at the start of `text` and what follows the row's line, if the row is a plain one: an id without
+/// quotes and the pixels of all cameras, digits alone. What any other row means, and what is wrong with it, [`parse`]
+/// says; of a plain one it says the same.
+#[inline]
+pub(super) fn parse_plain<'a, N: Number>(
+    text: &'a str,
+    columns: &Columns,
+    sightings: &mut Vec<Sighting<N>>,
+) -> Option<(&'a str, &'a str)> {
+    sightings.clear();
+    let bytes = text.as_bytes();
+    let id_end = bytes
+        .iter()
+        .position(|b| matches!(b, b',' | b'\n' | b'"'))?;
+    let mut rest = &bytes[id_end..];
+    for &camera_idx in &columns.camera_idx {
+        let [b',', behind @ ..] = rest else {
+            return None;
+        };
+        let (u, behind) = decimal::leading(behind)?;
+        let [b',', behind @ ..] = behind else {
+            return None;
+        };
+        let (v, behind) = decimal::leading(behind)?;
+        sightings.push((camera_idx, [u, v]));
+        rest = behind;
+    }
+    let rest = match rest {
+        [] | [b'\n'] | [b'\r', b'\n'] => &[],
+        [b'\n', behind @ ..] | [b'\r', b'\n', behind @ ..] => behind,
+        _ => return None,
+    };
+    Some((&text[..id_end], &text[text.len() - rest.len()..]))
 }
 
 /// The id of a row, without the quotes that may protect it.
@@ -93,22 +129,17 @@ pub(super) fn write<N: Number>(id: &str, result: &Result<Point<N>, Status>, out:
     out.extend_from_slice(id.as_bytes());
     match result {
         Ok(found) => {
-            let mut buffer = zmij::Buffer::new();
+            let mut numbers = Numbers::default();
             let [x, y, z] = found.point_mm;
             for value in [x, y, z, found.gap_mm] {
-                out.push(b',');
-                out.extend_from_slice(buffer.format(value).as_bytes());
+                numbers.add(value);
             }
             match found.sigma_mm {
-                None => out.extend_from_slice(b",,,"),
-                Some(sigma_mm) => {
-                    for value in sigma_mm {
-                        out.push(b',');
-                        out.extend_from_slice(buffer.format(value).as_bytes());
-                    }
-                }
+                None => numbers.add_text(b",,,"),
+                Some(sigma_mm) => sigma_mm.into_iter().for_each(|value| numbers.add(value)),
             }
-            out.extend_from_slice(b",ok\n");
+            numbers.add_text(b",ok\n");
+            out.extend_from_slice(numbers.text());
         }
         Err(status) => {
             out.extend_from_slice(b",,,,,,,,");
@@ -118,9 +149,75 @@ pub(super) fn write<N: Number>(id: &str, result: &Result<Point<N>, Status>, out:
     }
 }
 
+/// Longest number of 64 bits, with its comma.
+const LONGEST: usize = 25;
+
+/// What follows the id of a row: seven numbers and a word.
+struct Numbers {
+    bytes: [u8; 8 * LONGEST],
+    len: usize,
+}
+
+impl Default for Numbers {
+    fn default() -> Self {
+        Self {
+            bytes: [0; 8 * LONGEST],
+            len: 0,
+        }
+    }
+}
+
+impl Numbers {
+    /// Appends a comma and the number with the fewest digits that read back to the same bits.
+    #[inline]
+    fn add<N: Number>(&mut self, value: N) {
+        let mut buffer = zmij::Buffer::new();
+        let text = buffer.format(value).as_bytes();
+        let place = &mut self.bytes[self.len..][..LONGEST];
+        place[0] = b',';
+        // Two pieces of a fixed length, which may overlap, cost less than a call that copies any number of bytes.
+        match (text.first_chunk::<8>(), text.last_chunk::<8>()) {
+            (Some(first), Some(last)) if text.len() <= 16 => {
+                place[1..9].copy_from_slice(first);
+                place[text.len() - 7..][..8].copy_from_slice(last);
+            }
+            _ => place[1..=text.len()].copy_from_slice(text),
+        }
+        self.len += 1 + text.len();
+    }
+
+    #[inline]
+    fn add_text<const LENGTH: usize>(&mut self, text: &[u8; LENGTH]) {
+        self.bytes[self.len..][..LENGTH].copy_from_slice(text);
+        self.len += LENGTH;
+    }
+
+    fn text(&self) -> &[u8] {
+        &self.bytes[..self.len]
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_longest_numbers_have_room() {
+        let longest = f64::from_bits(0x8000_0000_0000_0001 | 1 << 52);
+        assert!(zmij::Buffer::new().format(longest).len() >= 23);
+        for value in [longest, 0.0, -1.5, 123_456.789_012_345, 1e300] {
+            let point = Point {
+                point_mm: [value; 3],
+                gap_mm: value,
+                sigma_mm: Some([value; 3]),
+            };
+            let mut out = Vec::new();
+            write("a", &Ok(point), &mut out);
+            let number = zmij::Buffer::new().format(value).to_owned();
+            let expected = format!("a{},ok\n", format!(",{number}").repeat(7));
+            assert_eq!(String::from_utf8(out), Ok(expected));
+        }
+    }
 
     fn parse_two(line: &str) -> Result<(&str, Vec<Sighting<f64>>), RowProblem> {
         let columns = Columns {
@@ -143,6 +240,47 @@ mod tests {
         ] {
             let line = format!("{id},1.5,2, 3.0 ,-4.25");
             assert_eq!(parse_two(&line), Ok((id, pixels.clone())), "{line}");
+        }
+    }
+
+    #[test]
+    fn plain_rows_are_read_as_any_other() {
+        let columns = Columns {
+            camera_idx: vec![1, 0],
+        };
+        let plain = |text: &'static str| {
+            let mut sightings = Vec::<Sighting<f64>>::new();
+            let found = parse_plain(text, &columns, &mut sightings)?;
+            Some((found.0, sightings, found.1))
+        };
+        for (text, rest) in [
+            ("7,1.5,2,3,-4.25", ""),
+            ("7,1.5,2,3,-4.25\n", ""),
+            ("7,1.5,2,3,-4.25\r\n8", "8"),
+            ("weld \u{3b1},906.43353,0,12345678,1.\n\nx", "\nx"),
+        ] {
+            let line = text.lines().next().unwrap();
+            let (id, sightings) = parse_two(line).unwrap();
+            assert_eq!(plain(text), Some((id, sightings, rest)), "{text}");
+        }
+        // Left to others, whether right or wrong.
+        for text in [
+            "",
+            "\n",
+            "7",
+            "\"7\",1,2,3,4",
+            "7, 1,2,3,4",
+            "7,1,2,,",
+            "7,1e2,2,3,4",
+            "7,1,2,3",
+            "7,1,2,3,4,5",
+            "7,1,2,3,4 \n",
+            "7,1,2,3,4\r",
+            "a\n7,1,2,3,4",
+            "7,+1,2,3,4",
+            "7,nan,2,3,4",
+        ] {
+            assert_eq!(plain(text), None, "{text:?}");
         }
     }
 

@@ -437,12 +437,22 @@ pub(super) fn each_row<'a, N: Number>(
     };
     let mut sightings = Vec::with_capacity(columns.camera_idx.len());
     let mut lines = 0;
-    for line in text.lines() {
-        if !line.is_empty() {
-            let id = row::parse(line, columns, &mut sightings);
-            if let Err(problem) = id.and_then(|id| take(id, &sightings)) {
-                return (lines, Some(problem));
-            }
+    let mut rest = text;
+    while !rest.is_empty() {
+        let id = if let Some((id, behind)) = row::parse_plain(rest, columns, &mut sightings) {
+            rest = behind;
+            Ok(Some(id))
+        } else {
+            let line = rest.lines().next().unwrap_or("");
+            rest = rest.split_once('\n').map_or("", |(_, behind)| behind);
+            let is_row = !line.is_empty();
+            is_row
+                .then(|| row::parse(line, columns, &mut sightings))
+                .transpose()
+        };
+        let taken = id.and_then(|id| id.map_or(Ok(()), |id| take(id, &sightings)));
+        if let Err(problem) = taken {
+            return (lines, Some(problem));
         }
         lines += 1;
     }
