@@ -30,6 +30,8 @@ pub enum Layout {
     /// Inner corners of a chessboard, pitch `square_mm`.
     #[default]
     Grid,
+    /// Inner corners of a chessboard whose squares are not square: pitch `square_mm` along x, and this along y, mm.
+    Rectangles(f64),
     /// Places on a flat printed face, mm, row by row.
     Face(#[schemars(with = "Vec<[f64; 2]>")] Arc<[[f64; 2]]>),
     /// Known places, by column; one row. They need not lie in a plane.
@@ -60,7 +62,7 @@ impl KnownPlace {
 impl Layout {
     /// Whether the labels are rows and columns of a printed face.
     pub fn is_grid(&self) -> bool {
-        matches!(self, Self::Grid | Self::Face(_))
+        matches!(self, Self::Grid | Self::Rectangles(_) | Self::Face(_))
     }
 
     /// Whether the places follow from rows, columns and pitch.
@@ -78,6 +80,30 @@ impl BoardSpec {
             square_mm,
             layout: Layout::Grid,
         }
+    }
+
+    /// A chessboard whose squares are `square_mm` wide along a row and `height_mm` high along a column.
+    pub const fn rectangles(rows: usize, cols: usize, square_mm: f64, height_mm: f64) -> Self {
+        Self {
+            rows,
+            cols,
+            square_mm,
+            layout: Layout::Rectangles(height_mm),
+        }
+    }
+
+    /// Pitch of the corners of a chessboard along x and along y, mm; `None` of another target.
+    fn pitches_mm(&self) -> Option<[f64; 2]> {
+        match self.layout {
+            Layout::Grid => Some([self.square_mm; 2]),
+            Layout::Rectangles(height_mm) => Some([self.square_mm, height_mm]),
+            _ => None,
+        }
+    }
+
+    /// Width and height of a chessboard's squares, mm; of another target its pitch.
+    pub fn square_sides_mm(&self) -> [f64; 2] {
+        self.pitches_mm().unwrap_or([self.square_mm; 2])
     }
 
     /// A target of known places.
@@ -111,6 +137,12 @@ impl BoardSpec {
     pub fn scaled(&self, factor: f64) -> Self {
         match &self.layout {
             Layout::Grid => Self::chessboard(self.rows, self.cols, self.square_mm * factor),
+            Layout::Rectangles(height_mm) => Self::rectangles(
+                self.rows,
+                self.cols,
+                self.square_mm * factor,
+                height_mm * factor,
+            ),
             Layout::Face(places) => Self::face(self.rows, self.cols, |row, col| {
                 places[row * self.cols + col].map(|mm| mm * factor)
             }),
@@ -129,7 +161,9 @@ impl BoardSpec {
     /// The shape that nothing is known of yet: of a printed face, total degree two; none where places are known.
     pub fn unknown_shape(&self) -> BoardShape {
         match &self.layout {
-            Layout::Grid | Layout::Face(_) => BoardShape::flat_of_degree_two(),
+            Layout::Grid | Layout::Rectangles(_) | Layout::Face(_) => {
+                BoardShape::flat_of_degree_two()
+            }
             Layout::Points(_) => BoardShape::default(),
         }
     }
@@ -137,7 +171,7 @@ impl BoardSpec {
     /// Standard deviation of each coordinate of a label's place, mm; 0 where it counts as exact.
     pub fn place_sigma_mm(&self, col: usize) -> f64 {
         match &self.layout {
-            Layout::Grid | Layout::Face(_) => 0.0,
+            Layout::Grid | Layout::Rectangles(_) | Layout::Face(_) => 0.0,
             Layout::Points(places) => places.get(col).map_or(0.0, |place| place.sigma_mm),
         }
     }
@@ -146,7 +180,7 @@ impl BoardSpec {
     /// and columns; of listed places the next in the list, if it is near.
     pub fn next_to(&self, row: usize, col: usize) -> impl Iterator<Item = (usize, usize)> {
         let along = match &self.layout {
-            Layout::Grid | Layout::Face(_) => true,
+            Layout::Grid | Layout::Rectangles(_) | Layout::Face(_) => true,
             Layout::Points(places) => {
                 let next = places.get(col + 1);
                 next.is_some_and(|next| {
@@ -167,11 +201,10 @@ impl BoardSpec {
     /// listed for it, no number if there is none.
     pub fn corner_in_board(&self, row: usize, col: usize) -> Vector3<f64> {
         match &self.layout {
-            Layout::Grid => Vector3::new(
-                col as f64 * self.square_mm,
-                row as f64 * self.square_mm,
-                0.0,
-            ),
+            Layout::Grid | Layout::Rectangles(_) => {
+                let [width_mm, height_mm] = self.square_sides_mm();
+                Vector3::new(col as f64 * width_mm, row as f64 * height_mm, 0.0)
+            }
             Layout::Face(places) => places
                 .get(row * self.cols + col)
                 .map_or_else(|| Vector3::repeat(f64::NAN), on_face),
@@ -184,7 +217,7 @@ impl BoardSpec {
     /// The middle of the corners' extent, board frame, mm.
     pub fn center_in_board(&self) -> Vector3<f64> {
         match &self.layout {
-            Layout::Grid => {
+            Layout::Grid | Layout::Rectangles(_) => {
                 let (width_mm, height_mm) = self.extent_mm();
                 Vector3::new(width_mm / 2.0, height_mm / 2.0, 0.0)
             }
@@ -202,10 +235,13 @@ impl BoardSpec {
     /// Distance from the first to the last corner along x and along y, mm.
     pub fn extent_mm(&self) -> (f64, f64) {
         match &self.layout {
-            Layout::Grid => (
-                self.cols.saturating_sub(1) as f64 * self.square_mm,
-                self.rows.saturating_sub(1) as f64 * self.square_mm,
-            ),
+            Layout::Grid | Layout::Rectangles(_) => {
+                let [width_mm, height_mm] = self.square_sides_mm();
+                (
+                    self.cols.saturating_sub(1) as f64 * width_mm,
+                    self.rows.saturating_sub(1) as f64 * height_mm,
+                )
+            }
             Layout::Face(places) => {
                 let (least, most) = bounds(places.iter().map(on_face));
                 (most.x - least.x, most.y - least.y)
@@ -227,14 +263,24 @@ impl BoardSpec {
 
     /// What it is, in words.
     pub fn words(&self) -> String {
+        self.words_of("inner corners")
+    }
+
+    /// What it is, in words; `points` is what its labels are, such as inner corners.
+    pub fn words_of(&self, points: &str) -> String {
+        let (rows, cols) = (self.rows, self.cols);
         match &self.layout {
             Layout::Grid => format!(
-                "{} rows x {} cols of inner corners, {} mm",
-                self.rows, self.cols, self.square_mm
+                "{rows} rows x {cols} cols of {points}, {} mm",
+                self.square_mm
+            ),
+            Layout::Rectangles(height_mm) => format!(
+                "{rows} rows x {cols} cols of {points}, {} x {height_mm} mm",
+                self.square_mm
             ),
             Layout::Face(_) => format!(
-                "{} rows x {} cols of printed points, {:.3} mm apart",
-                self.rows, self.cols, self.square_mm
+                "{rows} rows x {cols} cols of {points}, {:.3} mm apart",
+                self.square_mm
             ),
             Layout::Points(places) => format!("{} points with known places", places.len()),
         }
@@ -253,7 +299,7 @@ impl BoardSpec {
     /// So it is when rows and columns are both odd or both even; a board with one of each can be
     /// told apart by the color of its corner square. Listed places are told apart by their labels.
     pub fn looks_same_after_half_turn(&self) -> bool {
-        self.layout.is_even() && self.rows % 2 == self.cols % 2
+        self.pitches_mm().is_some() && self.rows % 2 == self.cols % 2
     }
 
     /// The label that a corner gets when the board is numbered from the opposite end.
@@ -369,6 +415,19 @@ mod tests {
             Vector3::new(120.0, 140.0, 0.0)
         );
         assert_eq!(BOARD.extent_mm(), (120.0, 140.0));
+    }
+
+    #[test]
+    fn rectangles_are_as_high_as_stated() {
+        let board = BoardSpec::rectangles(15, 13, 10.0, 10.5);
+        assert_eq!(
+            board.corner_in_board(14, 12),
+            Vector3::new(120.0, 147.0, 0.0)
+        );
+        assert_eq!(board.extent_mm(), (120.0, 147.0));
+        assert_eq!(board.apart_mm((0, 0), (1, 0)), 10.5);
+        assert_eq!(board.scaled(2.0).square_sides_mm(), [20.0, 21.0]);
+        assert!(board.looks_same_after_half_turn());
     }
 
     #[test]

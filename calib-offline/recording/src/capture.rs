@@ -1,7 +1,7 @@
 //! What a recording covers, before any estimate: which views there are, where on the sensor
 //! corners were seen, and which shot to add.
 
-use crate::dataset::{Dataset, check_sufficiency};
+use crate::dataset::{BoardKind, Dataset, check_sufficiency};
 use calib_rays::field::CoverageMask;
 use calib_rays::geometry::{PixelPoint, SensorSize};
 use calib_rays::observed::{Corner, View, poses};
@@ -100,6 +100,16 @@ impl Capture {
         for (camera, spec) in self.cameras.iter().zip(&dataset.cameras) {
             warnings.extend(camera.warning(spec.sensor, views_reach(dataset, views, &camera.name)));
         }
+        let without: Vec<String> = known_without_corners(dataset, views)
+            .iter()
+            .map(ToString::to_string)
+            .collect();
+        if !without.is_empty() {
+            warnings.push(format!(
+                "[poses] known has places of poses that no camera has corners of: {}",
+                without.join(", ")
+            ));
+        }
         for pose in &dataset.excluded_poses {
             if views.iter().any(|view| view.pose == *pose) {
                 warnings.push(format!("pose {pose} is excluded, but still counted here"));
@@ -107,6 +117,15 @@ impl Capture {
         }
         warnings
     }
+}
+
+/// Poses whose places are known, and of which no corners are there though nobody left them out.
+pub fn known_without_corners(dataset: &Dataset, views: &[View]) -> Vec<usize> {
+    let known = dataset.known_poses.keys().copied();
+    known
+        .filter(|pose| !dataset.excluded_poses.contains(pose))
+        .filter(|pose| !views.iter().any(|view| view.pose == *pose))
+        .collect()
 }
 
 impl CameraCapture {
@@ -192,9 +211,16 @@ fn board_warning(dataset: &Dataset, views: &[View]) -> Option<String> {
     };
     let (rows, cols) = (largest(|c| c.row)?, largest(|c| c.col)?);
     let board = &dataset.board;
+    let points = dataset.kind.points_in_a_word();
+    let why = match dataset.kind {
+        BoardKind::Chessboard | BoardKind::MarkedChessboard(_) | BoardKind::Charuco(_) => {
+            "does the manifest count squares instead of inner corners?".to_owned()
+        }
+        _ => format!("are rows and cols those of its {}?", dataset.kind.counted()),
+    };
     (rows < board.rows || cols < board.cols).then(|| {
         format!(
-            "the corners reach over {rows} rows and {cols} cols of a board with {} and {}: does the manifest count squares instead of inner corners?",
+            "the {points} reach over {rows} rows and {cols} cols of a board with {} and {}: {why}",
             board.rows, board.cols
         )
     })
@@ -203,8 +229,10 @@ fn board_warning(dataset: &Dataset, views: &[View]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::{BoardKind, CameraSpec};
+    use crate::dataset::CameraSpec;
     use calib_rays::board::BoardSpec;
+    use calib_rays::geometry::RigidTransform;
+    use calib_rays::observed::KnownPose;
 
     fn dataset(sensor: SensorSize) -> Dataset {
         Dataset {
@@ -220,6 +248,7 @@ mod tests {
             }],
             stage: None,
             known_poses: [].into(),
+            known_poses_file: None,
             excluded_poses: [].into(),
             target: None,
             certificate: None,
@@ -264,6 +293,28 @@ mod tests {
         assert_eq!(
             capture.cameras[0].corners_per_ninth.iter().sum::<usize>(),
             240
+        );
+    }
+
+    #[test]
+    fn known_poses_without_corners_are_named() {
+        let mut dataset = dataset(SensorSize::new(900, 600));
+        let place = |pose| {
+            let known = KnownPose {
+                rig_from_board: RigidTransform::identity(),
+                sigma_mm: 0.0,
+                sigma_rad: 0.0,
+            };
+            (pose, known)
+        };
+        dataset.known_poses = [0, 11, 12, 14].map(place).into();
+        dataset.excluded_poses = [14].into();
+        let views = views(12, [5.0, 5.0, 890.0, 590.0]);
+        assert_eq!(known_without_corners(&dataset, &views), [12]);
+        let warnings = Capture::of(&dataset, &views).warnings;
+        assert!(
+            warnings.iter().any(|w| w.ends_with("corners of: 12")),
+            "{warnings:?}"
         );
     }
 

@@ -30,7 +30,8 @@ pub struct Rig {
     pub cameras: Vec<CalibratedCamera>,
     /// The pose whose board frame is the rig frame.
     pub datum_pose: usize,
-    /// Whether the rig's frame is that of poses known beforehand, and not the board at the datum pose.
+    /// Whether the rig's frame is that of poses known beforehand, or of the file that the rig was imported from, and not the
+    /// board at the datum pose.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub frame_is_known: bool,
     /// How well pairs of cameras know their rays, the first camera with each other; empty if that
@@ -150,7 +151,7 @@ impl Rig {
     /// What the rig's frame is, in words.
     pub fn frame(&self) -> String {
         if self.frame_is_known {
-            "frame of the known poses".to_owned()
+            "frame that was given".to_owned()
         } else {
             format!("board at pose {}", self.datum_pose)
         }

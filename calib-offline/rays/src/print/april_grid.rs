@@ -192,7 +192,7 @@ mod tests {
         }
         assert_eq!(grid.border_mm(TagBorder::Two), 0.2);
         // OpenCV's, with one cell, are upside down.
-        let kalibr = grid.clone();
+        let kalibr = grid;
         grid.border = TagBorder::One;
         for row in 0..6 {
             for col in 0..6 {

@@ -36,6 +36,21 @@ impl Circles {
         (x as i64, row as i64)
     }
 
+    /// Where a circle goes when the grid is turned by quarter turns onto itself; `None` if that turn does not map it
+    /// onto itself.
+    pub fn turned(&self, (row, col): (usize, usize), quarters: u8) -> Option<(usize, usize)> {
+        let (last_row, last_col) = (self.rows.checked_sub(1)?, self.cols.checked_sub(1)?);
+        let is_square = self.rows == self.cols && !self.asymmetric;
+        match quarters % 4 {
+            0 => Some((row, col)),
+            2 if self.asymmetric && !self.rows.is_multiple_of(2) => None,
+            2 => Some((last_row.checked_sub(row)?, last_col.checked_sub(col)?)),
+            1 if is_square => Some((col, last_row.checked_sub(row)?)),
+            3 if is_square => Some((last_col.checked_sub(col)?, row)),
+            _ => None,
+        }
+    }
+
     /// Where a circle's center lies, mm.
     pub fn center_mm(&self, row: usize, col: usize) -> [f64; 2] {
         let (x, y) = self.place(row, col);
@@ -74,5 +89,48 @@ impl Circles {
             places.fold(0.0, f64::max) + margin
         };
         Artwork::new([-margin, last(0), -margin, last(1)], shapes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turn_maps_the_grid_onto_itself_or_is_none() {
+        let grid = |rows, cols, asymmetric| Circles {
+            rows,
+            cols,
+            pitch_mm: 1.0,
+            diameter_mm: 0.5,
+            asymmetric,
+            direction: Vec::new(),
+        };
+        for (grid, quarters, is_turn) in [
+            (grid(4, 6, false), 2, true),
+            (grid(4, 6, false), 1, false),
+            (grid(5, 5, false), 3, true),
+            (grid(9, 4, true), 2, false),
+            (grid(8, 4, true), 2, true),
+        ] {
+            let middle = |k: usize| {
+                let all = (0..grid.rows).flat_map(|r| (0..grid.cols).map(move |c| (r, c)));
+                let sum: f64 = all.map(|(r, c)| grid.center_mm(r, c)[k]).sum();
+                sum / (grid.rows * grid.cols) as f64
+            };
+            let (x0, y0) = (middle(0), middle(1));
+            for row in 0..grid.rows {
+                for col in 0..grid.cols {
+                    let to = grid.turned((row, col), quarters);
+                    assert_eq!(to.is_some(), is_turn);
+                    let Some((to_row, to_col)) = to else { continue };
+                    let [x, y] = grid.center_mm(row, col);
+                    let turn = |(x, y): (f64, f64)| (-y, x);
+                    let (dx, dy) = (0..quarters).fold((x - x0, y - y0), |at, _| turn(at));
+                    let [u, v] = grid.center_mm(to_row, to_col);
+                    assert!((u - x0 - dx).abs() + (v - y0 - dy).abs() < 1e-9);
+                }
+            }
+        }
     }
 }

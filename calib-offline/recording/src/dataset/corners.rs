@@ -6,7 +6,7 @@ pub(super) mod error;
 pub(super) mod fields;
 mod header;
 mod places;
-mod row;
+pub(super) mod row;
 
 pub use error::CornersError;
 pub use header::{HEADER, HEADER_WITH_SIGMA};

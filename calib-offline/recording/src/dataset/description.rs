@@ -25,6 +25,8 @@ pub struct Dataset {
     pub stage: Option<StageSpec>,
     /// Poses of the target that are known beforehand, by number; empty where the cameras find all of them.
     pub known_poses: BTreeMap<usize, KnownPose>,
+    /// The file that they stand in.
+    pub known_poses_file: Option<PathBuf>,
     /// Poses that the user leaves out.
     pub excluded_poses: BTreeSet<usize>,
     /// The measurement target, if the manifest describes one. No calibration depends on it.
@@ -105,6 +107,33 @@ impl BoardKind {
         "rings",
         "points",
     ];
+
+    /// What its labels are.
+    pub const fn points(&self) -> &'static str {
+        match self {
+            Self::Chessboard | Self::MarkedChessboard(_) | Self::Charuco(_) => "inner corners",
+            Self::AprilGrid(_) => "tags' corners",
+            Self::Circles(_) => "circles",
+            Self::Rings(_) => "rings",
+            Self::Points => "points",
+        }
+    }
+
+    /// The same in one word.
+    pub const fn points_in_a_word(&self) -> &'static str {
+        match self {
+            Self::Circles(_) | Self::Rings(_) | Self::Points => self.points(),
+            _ => "corners",
+        }
+    }
+
+    /// What rows and cols of the manifest count.
+    pub const fn counted(&self) -> &'static str {
+        match self {
+            Self::AprilGrid(_) => "tags",
+            _ => self.points(),
+        }
+    }
 
     /// The word in the manifest.
     pub const fn word(&self) -> &'static str {

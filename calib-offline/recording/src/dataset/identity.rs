@@ -33,6 +33,9 @@ pub fn input_sha256(dataset: &Dataset, views: &[View]) -> String {
     for (pose, known) in &dataset.known_poses {
         let _ = writeln!(facts, "known {pose} {known:?}");
     }
+    if let Layout::Rectangles(height_mm) = dataset.board.layout {
+        let _ = writeln!(facts, "height {height_mm}");
+    }
     if let Layout::Face(places) = &dataset.board.layout {
         let _ = writeln!(facts, "face {places:?}");
     }
@@ -99,6 +102,7 @@ mod tests {
             }],
             stage: None,
             known_poses: [].into(),
+            known_poses_file: None,
             excluded_poses: [3].into(),
             target: None,
             certificate: None,

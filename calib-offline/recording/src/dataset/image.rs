@@ -2,11 +2,14 @@
 
 pub mod bayer;
 mod jpeg_end;
+mod pixels;
 
 use calib_rays::geometry::SensorSize;
 use calib_rays::remedy::Remedy;
 use image::{DynamicImage, ImageFormat, ImageReader, Rgb};
+use pixels::Pixels;
 use std::io::Cursor;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// A gray image; values are the file's own code values (0 to [`GrayImage::white_level`]).
@@ -14,8 +17,8 @@ use std::path::{Path, PathBuf};
 pub struct GrayImage {
     /// Width and height.
     pub sensor: SensorSize,
-    /// Row-major, `width * height` values.
-    pub values: Vec<f32>,
+    /// Row-major, `width * height`, in no more bytes than the file's own.
+    pixels: Pixels,
     /// The largest value that its pixels can have: 255, or of 16 bits what the bits in use can hold: 1023 where no
     /// pixel has more, then 4095, 16383, 65535.
     pub white_level: f32,
@@ -103,7 +106,7 @@ impl GrayImage {
         let pixel_count = sensor.width as usize * sensor.height as usize;
         (pixel_count > 0 && values.len() == pixel_count).then_some(Self {
             sensor,
-            values,
+            pixels: Pixels::Float(values),
             white_level,
         })
     }
@@ -183,29 +186,47 @@ impl GrayImage {
                 | DynamicImage::ImageRgb16(_)
                 | DynamicImage::ImageRgba16(_)
         );
-        let (values, white_level): (Vec<f32>, f32) =
-            if let DynamicImage::ImageRgb8(colors) = decoded {
-                // As the image crate's conversion, without another copy of a large image.
-                let luminance = |p: &Rgb<u8>| {
-                    let [r, g, b] = p.0.map(u32::from);
-                    ((2126 * r + 7152 * g + 722 * b + 5000) / 10_000) as f32
-                };
-                (colors.pixels().map(luminance).collect(), f32::from(u8::MAX))
-            } else if deep {
-                let gray = decoded.into_luma16().into_raw();
-                let largest = gray.iter().copied().max().unwrap_or(0);
-                let white = BITS_IN_USE.into_iter().find(|white| largest <= *white);
-                let values = gray.into_iter().map(f32::from).collect();
-                (values, f32::from(white.unwrap_or(u16::MAX)))
-            } else {
-                let gray = decoded.into_luma8().into_raw();
-                let values = gray.into_iter().map(f32::from).collect();
-                (values, f32::from(u8::MAX))
+        let (pixels, white_level) = if let DynamicImage::ImageRgb8(colors) = decoded {
+            // As the image crate's conversion, without another copy of a large image.
+            let luminance = |p: &Rgb<u8>| {
+                let [r, g, b] = p.0.map(u32::from);
+                ((2126 * r + 7152 * g + 722 * b + 5000) / 10_000) as u8
             };
+            let gray = colors.pixels().map(luminance).collect();
+            (Pixels::Bytes(gray), f32::from(u8::MAX))
+        } else if deep {
+            let gray = decoded.into_luma16().into_raw();
+            let largest = gray.iter().copied().max().unwrap_or(0);
+            let white = BITS_IN_USE.into_iter().find(|white| largest <= *white);
+            let white_level = f32::from(white.unwrap_or(u16::MAX));
+            (Pixels::words(gray, 1.0), white_level)
+        } else {
+            let gray = decoded.into_luma8().into_raw();
+            (Pixels::Bytes(gray), f32::from(u8::MAX))
+        };
         Self {
             sensor,
-            values,
+            pixels,
             white_level,
+        }
+    }
+
+    /// All values, row by row.
+    pub fn values(&self) -> impl ExactSizeIterator<Item = f32> + '_ {
+        (0..self.pixels.len()).map(|index| self.pixels.at(index))
+    }
+
+    /// The value at a place in the row-major order, which must be inside the image.
+    #[inline]
+    pub fn value(&self, index: usize) -> f32 {
+        self.pixels.at(index)
+    }
+
+    /// Takes away the values of pixels (row-major places inside the image): what is covered says nothing.
+    pub fn cover(&mut self, places: impl Iterator<Item = usize>) {
+        let values = self.pixels.make_floats();
+        for place in places {
+            values[place] = f32::NAN;
         }
     }
 
@@ -214,7 +235,7 @@ impl GrayImage {
         let inside = (0..i64::from(self.sensor.width)).contains(&u)
             && (0..i64::from(self.sensor.height)).contains(&v);
         inside
-            .then(|| self.values[v as usize * self.sensor.width as usize + u as usize])
+            .then(|| self.value(v as usize * self.sensor.width as usize + u as usize))
             .filter(|value| !value.is_nan())
     }
 
@@ -236,20 +257,19 @@ impl GrayImage {
 
     /// The values below which the given fractions of the pixels lie.
     pub fn quantiles<const N: usize>(&self, fractions: [f64; N]) -> [f32; N] {
-        let mut values = self.values.clone();
-        let last = (values.len() - 1) as f64;
-        fractions.map(|fraction| {
-            let index = (last * fraction.clamp(0.0, 1.0)).round() as usize;
-            *values.select_nth_unstable_by(index, f32::total_cmp).1
-        })
+        self.pixels.quantiles(fractions)
     }
 
     /// The image in 8 bits, `black` and below to 0, `white` and above to 255.
     pub fn stretched(&self, black: f32, white: f32) -> Vec<u8> {
-        let scale = 255.0 / (white - black).max(f32::MIN_POSITIVE);
-        // To the nearest: the conversion cuts, and stops at 0 and 255.
-        let stretch = |v: &f32| ((v - black) * scale + 0.5) as u8;
-        self.values.iter().map(stretch).collect()
+        self.stretched_rows(black, white, 0..self.sensor.height as usize)
+    }
+
+    /// Some rows of [`GrayImage::stretched`], inside the image.
+    pub fn stretched_rows(&self, black: f32, white: f32, rows: Range<usize>) -> Vec<u8> {
+        let width = self.sensor.width as usize;
+        self.pixels
+            .stretched(black, white, rows.start * width..rows.end * width)
     }
 
     /// Twice the size, bilinear between the pixels and constant beyond the outermost.
@@ -261,7 +281,7 @@ impl GrayImage {
         let double = SensorSize::new(width.checked_mul(2)?, height.checked_mul(2)?);
         let place =
             |k: u32, count: u32| (f64::from(k) / 2.0 - 0.25).clamp(0.0, f64::from(count) - 1.0);
-        let mut values = Vec::with_capacity(4 * self.values.len());
+        let mut values = Vec::with_capacity(4 * self.pixels.len());
         for v in 0..double.height {
             for u in 0..double.width {
                 let value = self.between(place(u, width), place(v, height))?;
@@ -277,16 +297,13 @@ impl GrayImage {
     /// row or column is left out.
     pub fn halved(&self) -> Option<Self> {
         let half = SensorSize::new(self.sensor.width / 2, self.sensor.height / 2);
-        let width = self.sensor.width as usize;
-        let mut values = Vec::with_capacity(half.width as usize * half.height as usize);
-        for v in 0..half.height as usize {
-            for u in 0..half.width as usize {
-                let i = 2 * v * width + 2 * u;
-                let of = &self.values;
-                values.push((of[i] + of[i + 1] + of[i + width] + of[i + width + 1]) / 4.0);
-            }
-        }
-        Self::from_values(half, values, self.white_level)
+        (half.width > 0 && half.height > 0).then(|| Self {
+            sensor: half,
+            pixels: self
+                .pixels
+                .halved(self.sensor.width as usize, half, self.white_level),
+            white_level: self.white_level,
+        })
     }
 }
 
@@ -376,7 +393,7 @@ mod tests {
             .save(&path)
             .unwrap();
         let read = GrayImage::load(&path).unwrap();
-        assert!(read.values.iter().all(|v| (v - 90.0).abs() <= 1.0));
+        assert!(read.values().all(|v| (v - 90.0).abs() <= 1.0));
     }
 
     #[test]
@@ -424,12 +441,11 @@ mod tests {
         assert_eq!(image.between(1.01, 0.0), None);
         assert_eq!(image.between(-0.01, 0.0), None);
         assert_eq!(image.between(f64::NAN, 0.0), None);
-        assert_eq!(image.halved().unwrap().values, vec![15.0]);
+        assert_eq!(image.halved().unwrap().value(0), 15.0);
         let doubled = image.doubled().unwrap();
-        assert_eq!(&doubled.values[..4], &[0.0, 2.5, 7.5, 10.0]);
-        assert_eq!(
-            doubled.halved().unwrap().values,
-            [3.75, 11.25, 18.75, 26.25]
-        );
+        let first: Vec<f32> = doubled.values().take(4).collect();
+        assert_eq!(first, [0.0, 2.5, 7.5, 10.0]);
+        let back: Vec<f32> = doubled.halved().unwrap().values().collect();
+        assert_eq!(back, [3.75, 11.25, 18.75, 26.25]);
     }
 }

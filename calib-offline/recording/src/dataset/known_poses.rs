@@ -2,6 +2,7 @@
 //! One row per pose, header `pose,x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg` with optional `sigma_mm,sigma_deg`.
 
 use super::corners::fields::{shortened, unquoted};
+use super::corners::row::FARTHEST_MM;
 use calib_rays::geometry::{RigidTransform, so3};
 use calib_rays::observed::KnownPose;
 use calib_rays::remedy::Remedy;
@@ -13,6 +14,9 @@ use std::path::{Path, PathBuf};
 pub const HEADER: &str = "pose,x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg";
 /// The header with them.
 pub const HEADER_WITH_SIGMAS: &str = "pose,x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg,sigma_mm,sigma_deg";
+
+/// A rotation vector's components are no larger than a whole turn.
+const MOST_DEG: f64 = 360.0;
 
 /// Why the file was not accepted.
 #[derive(Debug, thiserror::Error)]
@@ -66,6 +70,20 @@ pub enum KnownPosesError {
         /// What it must be.
         expected: &'static str,
     },
+    /// A place or a turn that is beyond all bounds.
+    #[error("{}:{line}: {column} is {value:e}; it lies between -{most} and {most}", file.display())]
+    Beyond {
+        /// The file.
+        file: PathBuf,
+        /// From 1.
+        line: usize,
+        /// The column.
+        column: &'static str,
+        /// The value.
+        value: f64,
+        /// The most.
+        most: f64,
+    },
     /// One pose twice.
     #[error("{}:{line}: pose {pose} stands already in line {first_line}", file.display())]
     Duplicate {
@@ -92,6 +110,9 @@ impl Remedy for KnownPosesError {
                 "each line has one pose; decimal points are points, not commas"
             }
             Self::Number { .. } => "correct the field; poses count from 0",
+            Self::Beyond { .. } => {
+                "correct the field: millimeters, and degrees of a rotation vector"
+            }
             Self::Duplicate { .. } => "keep the better of the two lines",
         };
         Some(text.to_owned())
@@ -194,11 +215,25 @@ fn row(
         } else {
             "finite number"
         };
+        let most = match k {
+            1..=3 => FARTHEST_MM,
+            4..=6 => MOST_DEG,
+            _ => f64::INFINITY,
+        };
         values[k] = field
             .parse::<f64>()
             .ok()
             .filter(|value| value.is_finite() && (!is_sigma || *value >= 0.0))
             .ok_or_else(|| not_a(k, expected))?;
+        if values[k].abs() > most {
+            return Err(KnownPosesError::Beyond {
+                file: file.to_owned(),
+                line,
+                column: COLUMNS[k],
+                value: values[k],
+                most,
+            });
+        }
     }
     let [_, x, y, z, rx, ry, rz, sigma_mm, sigma_deg] = values;
     let turn = Vector3::new(rx, ry, rz).map(f64::to_radians);

@@ -66,6 +66,7 @@ impl Dataset {
             cameras,
             stage: None,
             known_poses: BTreeMap::new(),
+            known_poses_file: None,
             excluded_poses: BTreeSet::new(),
             target: None,
             certificate,
@@ -76,8 +77,10 @@ impl Dataset {
         };
         dataset.target = target::target(&source, &dataset, raw.target, &raw.camera)?;
         if let Some(known) = raw.poses.and_then(|poses| poses.known) {
-            dataset.known_poses = known_poses::read(&dataset.folder.join(known))
-                .map_err(|source| ManifestError::KnownPoses { source })?;
+            let file = dataset.folder.join(known);
+            dataset.known_poses =
+                known_poses::read(&file).map_err(|source| ManifestError::KnownPoses { source })?;
+            dataset.known_poses_file = Some(file);
         }
         if dataset.kind == BoardKind::Points && !has_corners {
             return Err(ManifestError::NoPlaces { file: source.file });

@@ -15,6 +15,9 @@ const MIN_SCATTER_SHARE: f64 = 1e-3;
 /// noise alone stays below it; the smallest step of a stage moves corners by more.
 const SAME_VIEW_PX: f64 = 1.0;
 
+/// Fewest points of a solid target: two numbers each for six of the pose and nine of a plain lens.
+const FEWEST_POINTS: usize = 8;
+
 /// Why the corners cannot determine a calibration.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -31,6 +34,27 @@ pub enum SufficiencyError {
         have: usize,
         /// Poses seen without.
         unusable: usize,
+        /// How many it takes.
+        need: usize,
+    },
+    /// A camera of a target of known places, or of known poses, without any corner.
+    #[error(
+        "camera \"{camera}\" saw nothing: it has no line in {}",
+        Dataset::CORNERS
+    )]
+    Blind {
+        /// The camera.
+        camera: String,
+    },
+    /// Fewer points of a solid target than a lens and a pose have numbers for.
+    #[error(
+        "camera \"{camera}\" saw {have} points; one pose determines a camera with {need} at the least"
+    )]
+    FewPoints {
+        /// The camera.
+        camera: String,
+        /// Points seen.
+        have: usize,
         /// How many it takes.
         need: usize,
     },
@@ -85,6 +109,12 @@ impl Remedy for SufficiencyError {
             Self::TooFewPoses { .. } => {
                 "record at least ten poses at different tilts and distances, with the board over the whole image"
             }
+            Self::Blind { .. } => {
+                "add its corners under that name, or leave its [[camera]] out of dataset.toml"
+            }
+            Self::FewPoints { .. } => {
+                "add points over the whole image and over all depths: some fifty hold a lens well"
+            }
             Self::Flat { need, .. } => {
                 return Some(format!(
                     "add points off that plane, or at least {need} poses of it at different tilts, or say with [poses] known how it was moved"
@@ -123,6 +153,12 @@ pub fn check_sufficiency(dataset: &Dataset, views: &[View]) -> Result<(), Suffic
             .into_iter()
             .partition(|view| spreads_over_plane(&dataset.board, &view.corners));
         let have = poses(&good).len();
+        let is_known = !dataset.board.layout.is_grid() || !dataset.known_poses.is_empty();
+        if is_known && good.is_empty() && lines.is_empty() {
+            return Err(SufficiencyError::Blind {
+                camera: camera.name.clone(),
+            });
+        }
         if have == 0 && !lines.is_empty() {
             return Err(SufficiencyError::OnALine {
                 camera: camera.name.clone(),
@@ -130,6 +166,14 @@ pub fn check_sufficiency(dataset: &Dataset, views: &[View]) -> Result<(), Suffic
             });
         }
         if is_solid(dataset, &good) {
+            let points = good.iter().map(|view| view.corners.len()).sum();
+            if have < MIN_POSES && points < FEWEST_POINTS {
+                return Err(SufficiencyError::FewPoints {
+                    camera: camera.name.clone(),
+                    have: points,
+                    need: FEWEST_POINTS,
+                });
+            }
             usable[camera_idx] = good;
             continue;
         }

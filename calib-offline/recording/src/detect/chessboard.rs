@@ -8,8 +8,8 @@ use crate::dataset::image::GrayImage;
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::PixelPoint;
 use calib_targets_chessboard::{
-    ChessboardDetector as TopologicalGrid, ChessboardParams, GrayImageView, default_chess_config,
-    detect_corners,
+    ChessCorner, ChessboardDetector as TopologicalGrid, ChessboardParams, GrayImageView,
+    default_chess_config, detect_corners,
 };
 use chess_corners::ImageRefiner;
 use std::collections::BTreeMap;
@@ -47,12 +47,16 @@ pub struct ChessTopologicalDetector;
 /// Images with more pixels than this are searched at half size first, with sixteen times more at a
 /// quarter.
 const LARGE_PIXELS: usize = 600_000;
+/// Pixels that are searched at once.
+const STRIP_PIXELS: usize = 2_000_000;
+/// Rows beyond a strip that the search of a corner in it looks at, and more.
+const STRIP_MARGIN_PX: usize = 32;
 /// Fractions of the pixels that are allowed to saturate when the image is stretched.
 const STRETCH_QUANTILES: [f64; 2] = [0.005, 0.995];
 
 impl ChessboardDetector for ChessTopologicalDetector {
     fn detect(&self, image: &GrayImage, board: &BoardSpec) -> Vec<Vec<RawCorner>> {
-        let pixels = image.values.len();
+        let pixels = image.values().len();
         let order = if pixels > 16 * LARGE_PIXELS {
             [Size::Quarter, Size::Half, Size::Full]
         } else if pixels > LARGE_PIXELS {
@@ -176,15 +180,7 @@ pub fn parts_at(image: &GrayImage, size: Size) -> Vec<Vec<RawCorner>> {
 }
 
 fn detect_at(image: &GrayImage, scale: Scale) -> Vec<Vec<RawCorner>> {
-    let [black, white] = image.quantiles(STRETCH_QUANTILES);
-    let stretched = image.stretched(black, white);
-    let view = GrayImageView {
-        width: image.sensor.width as usize,
-        height: image.sensor.height as usize,
-        data: &stretched,
-    };
-    let config = default_chess_config().with_refiner(ImageRefiner::saddle_point());
-    let corners = detect_corners(&view, &config);
+    let corners = corners_in_strips(image, STRIP_PIXELS);
     let Ok(grid) = TopologicalGrid::new(ChessboardParams::default()) else {
         return Vec::new();
     };
@@ -205,4 +201,72 @@ fn detect_at(image: &GrayImage, scale: Scale) -> Vec<Vec<RawCorner>> {
         .collect();
     grids.sort_by_key(|grid| std::cmp::Reverse(grid.len()));
     grids
+}
+
+/// The corners of an image, searched strip by strip: what the search keeps per pixel is several times the image, and
+/// is kept of one strip at a time. A corner counts in the strip that it lies in; each is seen with all that its search
+/// looks at.
+fn corners_in_strips(image: &GrayImage, strip_pixels: usize) -> Vec<ChessCorner> {
+    let [black, white] = image.quantiles(STRETCH_QUANTILES);
+    let (width, height) = (image.sensor.width as usize, image.sensor.height as usize);
+    // What is weaker is left out of every grid, and need not be looked at closely.
+    let config = default_chess_config()
+        .with_refiner(ImageRefiner::saddle_point())
+        .with_threshold(ChessboardParams::default().min_corner_strength);
+    let strips = (width * height).div_ceil(strip_pixels).max(1);
+    let first_row = |strip: usize| strip * height / strips;
+    let mut corners = Vec::new();
+    for strip in 0..strips {
+        let own = first_row(strip)..first_row(strip + 1);
+        let from = own.start.saturating_sub(STRIP_MARGIN_PX);
+        let to = (own.end + STRIP_MARGIN_PX).min(height);
+        let view = GrayImageView {
+            width,
+            height: to - from,
+            data: &image.stretched_rows(black, white, from..to),
+        };
+        // Places below the last row's middle belong to it.
+        let (upper, lower) = (own.start as f32 - 0.5, own.end as f32 - 0.5);
+        corners.extend(
+            detect_corners(&view, &config)
+                .into_iter()
+                .map(|mut corner| {
+                    corner.position.y += from as f32;
+                    corner
+                })
+                .filter(|corner| {
+                    (strip == 0 || corner.position.y >= upper)
+                        && (strip + 1 == strips || corner.position.y < lower)
+                }),
+        );
+    }
+    corners
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use calib_rays::geometry::SensorSize;
+
+    #[test]
+    fn strips_find_the_corners_of_the_whole_image() {
+        // Squares of 11 px, turned a little: corners lie on every border between strips.
+        let (width, height) = (400, 300);
+        let values = (0..width * height).map(|k| {
+            let (u, v) = (f64::from(k % width), f64::from(k / width));
+            let (x, y) = ((u + 0.2 * v) / 11.0, (v - 0.2 * u) / 11.0);
+            let wave = (std::f64::consts::PI * x).sin() * (std::f64::consts::PI * y).sin();
+            (128.0 + 120.0 * (8.0 * wave).tanh()) as f32
+        });
+        let sensor = SensorSize::new(width, height);
+        let image = GrayImage::from_values(sensor, values.collect(), 255.0).unwrap();
+        let whole = corners_in_strips(&image, usize::MAX);
+        let strips = corners_in_strips(&image, 20_000);
+        assert!(whole.len() > 800, "{}", whole.len());
+        assert_eq!(whole.len(), strips.len());
+        for (a, b) in whole.iter().zip(&strips) {
+            assert!((a.position - b.position).norm() < 1e-3);
+            assert_eq!(a.strength, b.strength);
+        }
+    }
 }

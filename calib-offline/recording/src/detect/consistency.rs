@@ -55,6 +55,22 @@ pub enum ConsistencyError {
         /// Turn after which the board looks the same, degrees.
         period_deg: f64,
     },
+    /// The turn of a grid of circles from one camera to another cannot be told.
+    #[error(
+        "the grid looks the same after a turn of {period_deg:.0} degrees, and from camera {first_camera} to camera \
+         {second_camera} it is turned by about {turn_deg:.0}, so that it is unclear which circles belong together; \
+         mark some of them (direction), or add poses that tilt the grid in different directions"
+    )]
+    CirclesBetweenCameras {
+        /// Name of the camera whose numbering is known.
+        first_camera: String,
+        /// The camera that cannot be decided.
+        second_camera: String,
+        /// Smallest turn between the cameras that one of the numberings allows, degrees.
+        turn_deg: f64,
+        /// Turn after which the grid looks the same, degrees.
+        period_deg: f64,
+    },
     /// The turn from one camera to another cannot be told.
     #[error(
         "the board looks the same after a turn of {period_deg:.0} degrees, and from camera \
@@ -75,6 +91,15 @@ pub enum ConsistencyError {
         /// Turn after which the board looks the same, degrees.
         period_deg: f64,
     },
+}
+
+impl ConsistencyError {
+    /// Epipolar geometry decides between turns of a camera if the best of the distances (px) is clearly the
+    /// least; `step_px` from one point to the next.
+    pub(super) fn is_clear(best_px: f64, second_px: f64, step_px: f64) -> bool {
+        best_px <= EPIPOLAR_SQUARES * step_px
+            && second_px >= (EPIPOLAR_FACTOR * best_px).max(EPIPOLAR_FLOOR_PX)
+    }
 }
 
 /// A choice between turns counts as clear if the second best fits worse by this, rad.
@@ -341,9 +366,7 @@ impl Settling<'_> {
         }
         scored.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (best, second) = (scored.first()?, scored.get(1)?);
-        let clear = best.0 <= EPIPOLAR_SQUARES * square_px
-            && second.0 >= (EPIPOLAR_FACTOR * best.0).max(EPIPOLAR_FLOOR_PX);
-        clear.then_some(best.1)
+        ConsistencyError::is_clear(best.0, second.0, square_px).then_some(best.1)
     }
 
     /// Corners that a settled view and a view under a placement have in common.

@@ -2,6 +2,7 @@
 
 use super::consistency::ConsistencyError;
 use super::grid_size::GridSize;
+use super::seen_board::SeenBoard;
 use crate::dataset::image::ImageError;
 use calib_rays::geometry::SensorSize;
 use calib_rays::remedy::Remedy;
@@ -41,6 +42,21 @@ pub enum DetectError {
         /// All images.
         of: usize,
     },
+    /// Images of another target than the one described, beside some that fit it.
+    #[error(
+        "{count} images show {seen}, the manifest describes {stated}, and the {used_count} images that would fit it may \
+         show parts of the other"
+    )]
+    WrongTarget {
+        /// What is seen.
+        seen: SeenBoard,
+        /// What the manifest describes.
+        stated: String,
+        /// Images that show the other.
+        count: usize,
+        /// Images that would be used.
+        used_count: usize,
+    },
     /// A file that should be an image of this camera and is not: damaged, or of another size.
     /// An image that merely shows no board is refused and no error.
     #[error(
@@ -70,7 +86,11 @@ impl Remedy for DetectError {
                 return Some(odd_sizes_remedy(images, *are_all));
             }
             Self::WrongCount { found, stated, .. } => return Some(found.hint(*stated)),
+            Self::WrongTarget { seen, .. } => return Some(seen.what_to_write()),
             Self::BrokenImage { source, .. } => return source.remedy(),
+            Self::Consistency(ConsistencyError::CirclesBetweenCameras { .. }) => {
+                "mark some of the circles (direction), or add poses that tilt the grid in different directions"
+            }
             Self::Consistency(_) => {
                 "look at the images with --overlay DIR; a board with an odd and an even number of corners cannot be turned unnoticed"
             }

@@ -1,6 +1,6 @@
 //! From images to labelled corners.
 //!
-//! Per image: rough grid of corners ([`chessboard`]), sub-pixel fit and completion ([`grid`],
+//! Per image: rough grid of corners ([`chessboard`]), sub-pixel fit and completion (`grid_fit.rs`,
 //! [`corner_fit`]), their scatter, possible places on the board ([`labelling`], [`border`]). Over all images:
 //! the same label for the same corner ([`consistency`], [`epipolar`]). Every image gets a verdict
 //! ([`verdict`]).
@@ -11,6 +11,7 @@
 
 pub mod border;
 pub mod chessboard;
+mod completion;
 pub mod consistency;
 pub mod corner_fit;
 mod corner_window;
@@ -20,11 +21,13 @@ mod edge_model;
 pub mod epipolar;
 mod error;
 pub mod grid;
+mod grid_fit;
 pub mod grid_size;
 pub mod homography;
 pub mod illegible;
 mod job;
 pub mod labelling;
+mod lattice;
 pub mod marked;
 pub mod overlay;
 mod pair_check;
@@ -41,7 +44,7 @@ mod wrong_count;
 pub use detection::{Detection, TurnedImage};
 pub use error::{DetectError, OddImage};
 pub use pair_check::PairCheck;
-pub use seen_board::SeenBoard;
+pub use seen_board::{SeenBoard, SeenKind};
 pub use settings::DetectSettings;
 
 use crate::dataset::image::{GrayImage, ImageError, bayer};
@@ -56,6 +59,8 @@ use grid::FittedGrid;
 use illegible::{Illegible, Shown};
 use job::{Job, all_loaded, check_sizes};
 use labelling::{Placement, placements};
+use printed::charuco_parts::Part;
+use printed::instead::{self, Stated, corners};
 use rayon::prelude::*;
 use verdict::{
     ImageFigures, ImageVerdict, MissingCorner, Outcome, Refusal, why_not_placed, why_nothing_found,
@@ -173,7 +178,9 @@ pub fn detect_dataset_with(
                     used(&view, &placement, &dataset.board)
                 }
                 Some((view, None)) => Outcome::Refused(not_settled(&view, figures.as_ref())),
-                None => Outcome::Refused(Refusal::NoBoard),
+                None => Outcome::Refused(Refusal::NoBoard {
+                    kind: dataset.kind.word(),
+                }),
             },
         };
         images.push(ImageVerdict {
@@ -244,12 +251,40 @@ fn inspect_gray(
         }
     }
     best.map_err(|refusal| {
-        let largest = grids.first().map_or(&[][..], Vec::as_slice);
-        printed::charuco_seen::instead_of_chessboard(image, largest, board)
+        // Of another chessboard the refusal says more.
+        let is_plain = dataset.kind == BoardKind::Chessboard;
+        instead::other(image, &stated(dataset))
+            .filter(|other| !(is_plain && other.is_of_plain_chessboard()) || refusal.is_none())
             .or(refusal)
-            .unwrap_or_else(|| why_nothing_found(image))
+            .unwrap_or_else(|| why_nothing_found(image, dataset.kind.word()))
     })
 }
+
+/// The description of a chessboard.
+fn stated(dataset: &Dataset) -> Stated {
+    let marked = match &dataset.kind {
+        BoardKind::MarkedChessboard(marked) => &marked[..],
+        _ => &[],
+    };
+    Stated::chessboard((dataset.board.rows, dataset.board.cols), marked)
+}
+
+/// Fewest squares with a dot that make another board of a chessboard without.
+const MIN_DOTS: usize = 2;
+
+/// The refusal of a grid whose cells are no squares, or have dots that are not stated, if another target
+/// is what they are.
+fn not_as_stated(image: &GrayImage, raw: &[RawCorner], dataset: &Dataset) -> Option<Refusal> {
+    let part = Part::of(raw);
+    let is_plain = dataset.kind == BoardKind::Chessboard;
+    let has_dots = is_plain && marked::clear_dots(&marked::squares(image, raw)).len() >= MIN_DOTS;
+    let is_checkered = corners::checkered(image, &part).is_none_or(|part| part >= CHECKERED);
+    let refusal = (has_dots || !is_checkered).then(|| instead::other(image, &stated(dataset)));
+    refusal.flatten()
+}
+
+/// Part of the cells that are squares of one color on any chessboard, with glare and hands before it.
+const CHECKERED: f64 = 0.8;
 
 /// What one grid of an image shows.
 fn inspect_grid(
@@ -259,6 +294,9 @@ fn inspect_grid(
     settings: &DetectSettings,
 ) -> Result<Inspected, Refusal> {
     let board = &dataset.board;
+    if let Some(refusal) = not_as_stated(image, raw, dataset) {
+        return Err(refusal);
+    }
     let marked = match &dataset.kind {
         BoardKind::MarkedChessboard(marked) => Some((marked, marked::squares(image, raw))),
         _ => None,
@@ -266,7 +304,7 @@ fn inspect_grid(
     let without_dots = marked.as_ref().map(|(_, s)| marked::without_dots(image, s));
     let image = without_dots.as_ref().unwrap_or(image);
     let grid = FittedGrid::from_raw(image, raw, board, settings.max_half_window_px)
-        .ok_or_else(|| why_nothing_found(image))?;
+        .ok_or_else(|| why_nothing_found(image, dataset.kind.word()))?;
     let figures = ImageFigures::of(image, &grid);
     if let (Some(typical), Some(square_px)) = (grid.typical(), grid.square_px())
         && typical.blur_px > verdict::MAX_BLUR_SQUARES * square_px

@@ -30,12 +30,36 @@ const STEPS: usize = 4;
 /// Standard deviation per axis that the corners have beyond what their fits predict, px; `None` if too
 /// few are there to tell.
 pub fn model_error_px(corners: &BTreeMap<(i32, i32), FittedCorner>, square_px: f64) -> Option<f64> {
-    let predicted = |c: &FittedCorner| c.sigma_px.powi(2);
-    let mean_predicted = corners.values().map(predicted).sum::<f64>() / corners.len() as f64;
-    let smooth = Smooth::of(corners)?;
+    let points: Vec<Scattered> = corners
+        .iter()
+        .map(|(&(i, j), c)| Scattered {
+            place: Vector2::new(f64::from(i), f64::from(j)),
+            pixel: Vector2::new(c.pixel.u, c.pixel.v),
+            sigma_px: c.sigma_px,
+        })
+        .collect();
+    beyond_predicted_px(&points, square_px)
+}
+
+/// A point of a flat target.
+#[derive(Debug, Clone, Copy)]
+pub struct Scattered {
+    /// Its place on the target.
+    pub place: Vector2<f64>,
+    /// Where it was found, px.
+    pub pixel: Vector2<f64>,
+    /// Standard deviation per axis that its fit predicts, px.
+    pub sigma_px: f64,
+}
+
+/// As [`model_error_px`], of the points of any flat target; `step_px` from one to the next.
+pub fn beyond_predicted_px(points: &[Scattered], step_px: f64) -> Option<f64> {
+    let predicted = points.iter().map(|point| point.sigma_px.powi(2));
+    let mean_predicted = predicted.sum::<f64>() / points.len() as f64;
+    let smooth = Smooth::of(points)?;
     let degrees = DEGREES.filter_map(|degree| smooth.variance_beyond(degree));
     let variance = degrees.min_by(f64::total_cmp)?;
-    if variance.sqrt() > MAX_SCATTER_SQUARES * square_px {
+    if variance.sqrt() > MAX_SCATTER_SQUARES * step_px {
         return None;
     }
     Some((variance - mean_predicted).max(0.0).sqrt())
@@ -70,15 +94,9 @@ struct Smooth {
 }
 
 impl Smooth {
-    fn of(corners: &BTreeMap<(i32, i32), FittedCorner>) -> Option<Self> {
-        let board: Vec<Vector2<f64>> = corners
-            .keys()
-            .map(|&(i, j)| Vector2::new(f64::from(i), f64::from(j)))
-            .collect();
-        let image: Vec<Vector2<f64>> = corners
-            .values()
-            .map(|c| Vector2::new(c.pixel.u, c.pixel.v))
-            .collect();
+    fn of(points: &[Scattered]) -> Option<Self> {
+        let board: Vec<Vector2<f64>> = points.iter().map(|point| point.place).collect();
+        let image: Vec<Vector2<f64>> = points.iter().map(|point| point.pixel).collect();
         let (board, _) = scaled(&board)?;
         let (image, px_per_unit) = scaled(&image)?;
         let corners: Vec<_> = board.into_iter().zip(image).collect();

@@ -6,7 +6,8 @@ use super::grid_size::GridSize;
 use super::illegible::{EDGE_WIDTH_OF_BLUR, Illegible, Shown};
 use super::labelling::Placement;
 use super::ring_target::TargetRefusal;
-use super::seen_board::SeenBoard;
+use super::seen_board::{SeenBoard, SeenKind};
+use crate::dataset::BoardKind;
 use crate::dataset::image::GrayImage;
 use calib_rays::board::BoardSpec;
 use calib_rays::geometry::{PixelPoint, SensorSize};
@@ -103,9 +104,15 @@ pub enum Refusal {
     /// The image shows nothing clearly.
     #[error(transparent)]
     Illegible(#[from] Illegible),
-    /// No grid of corners.
-    #[error("no chessboard found: is the whole board in view, and lit evenly?")]
-    NoBoard,
+    /// Nothing of the board.
+    #[error(
+        "no {} found: is the whole board in view, and lit evenly?",
+        named(kind)
+    )]
+    NoBoard {
+        /// The board's kind in the manifest.
+        kind: &'static str,
+    },
     /// A board of another size.
     #[error("the image shows {found} inner corners, the manifest says rows = {}, cols = {}: {}",
         stated.rows, stated.cols, found.hint(*stated))]
@@ -191,6 +198,12 @@ pub enum Refusal {
 }
 
 impl Refusal {
+    /// Whether it is because of a chessboard that is not the one described.
+    pub(super) fn is_of_plain_chessboard(&self) -> bool {
+        matches!(self, Self::OtherBoard { seen, .. }
+            if matches!(&seen.kind, SeenKind::Chessboard { marked } if marked.is_empty()))
+    }
+
     /// Whether it is because of a board of another size that is seen as a whole.
     pub fn is_of_a_whole_board(&self) -> bool {
         matches!(self, Self::WrongBoard { is_whole: true, .. })
@@ -242,8 +255,17 @@ impl ImageFigures {
 }
 
 /// Why nothing was found in an image that could be read.
-pub fn why_nothing_found(image: &GrayImage) -> Refusal {
-    Illegible::of(image, Shown::Board).map_or(Refusal::NoBoard, Refusal::from)
+pub fn why_nothing_found(image: &GrayImage, kind: &'static str) -> Refusal {
+    Illegible::of(image, Shown::Board).map_or(Refusal::NoBoard { kind }, Refusal::from)
+}
+
+/// A board of a kind, in words.
+fn named(kind: &str) -> String {
+    if kind == BoardKind::Chessboard.word() {
+        kind.to_owned()
+    } else {
+        format!("board of kind \"{kind}\"")
+    }
 }
 
 /// The grid, with the borders seen around it, is no part of the board.

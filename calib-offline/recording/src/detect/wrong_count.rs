@@ -3,6 +3,7 @@
 
 use super::error::DetectError;
 use super::grid_size::GridSize;
+use super::seen_board::{SeenBoard, SeenKind};
 use super::verdict::Refusal;
 use calib_rays::board::BoardSpec;
 use std::collections::BTreeMap;
@@ -40,6 +41,44 @@ pub(super) fn check<'a>(
                 count,
                 stated_count,
                 of,
+            })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Images that are used for each that clearly shows another target, beyond which those are another target's.
+const USED_PER_OTHER: usize = 4;
+
+/// Whether some images clearly show a target that is not the one described: parts of it in the others may have
+/// been taken for parts of the one described. Where none is used, the images' own verdicts say as much.
+///
+/// # Errors
+/// [`DetectError::WrongTarget`].
+pub(super) fn check_targets<'a>(
+    refusals: impl Iterator<Item = &'a Refusal>,
+    used_count: usize,
+) -> Result<(), DetectError> {
+    let mut others: BTreeMap<String, (usize, &SeenBoard, &str)> = BTreeMap::new();
+    for refusal in refusals {
+        if let Refusal::OtherBoard { seen, stated } = refusal
+            && !matches!(seen.kind, SeenKind::Markers { .. })
+        {
+            let of_kind = others
+                .entry(seen.what_to_write())
+                .or_insert((0, seen, stated));
+            of_kind.0 += 1;
+        }
+    }
+    match others.into_values().max_by_key(|(count, ..)| *count) {
+        Some((count, seen, stated))
+            if used_count > 0 && count >= SEVERAL && count * USED_PER_OTHER >= used_count =>
+        {
+            Err(DetectError::WrongTarget {
+                seen: seen.clone(),
+                stated: stated.to_owned(),
+                count,
+                used_count,
             })
         }
         _ => Ok(()),

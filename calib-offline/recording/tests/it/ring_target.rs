@@ -43,9 +43,9 @@ fn assert_labels(located: &Located, truth: &Truth) {
 
 fn changed(image: &GrayImage, value: impl Fn(f64, f64, f32) -> f32) -> GrayImage {
     let width = image.sensor.width as usize;
-    let values = image.values.iter().enumerate();
+    let values = image.values().enumerate();
     let values = values
-        .map(|(i, &old)| value((i % width) as f64, (i / width) as f64, old))
+        .map(|(i, old)| value((i % width) as f64, (i / width) as f64, old))
         .collect();
     GrayImage::from_values(image.sensor, values, image.white_level).unwrap()
 }
@@ -59,7 +59,7 @@ fn turned(image: &GrayImage, truth: &Truth, quarters: usize) -> (GrayImage, Trut
             .map(|i| {
                 let (u, v) = (i % height, i / height);
                 let (old_u, old_v) = (v, height - 1 - u);
-                image.values[(old_v * width + old_u) as usize]
+                image.value((old_v * width + old_u) as usize)
             })
             .collect();
         let last = f64::from(height - 1);
@@ -165,8 +165,8 @@ fn a_turned_image_has_the_same_labels_and_a_mirrored_one_is_refused() {
         assert_eq!(usize::from(located.quarter_turns), quarters);
         assert_labels(&located, &truth);
         let width = image.sensor.width as usize;
-        let values = (0..image.values.len())
-            .map(|i| image.values[i - i % width + width - 1 - i % width])
+        let values = (0..image.values().len())
+            .map(|i| image.value(i - i % width + width - 1 - i % width))
             .collect();
         let mirrored = GrayImage::from_values(image.sensor, values, 255.0).unwrap();
         let refusal = crate::ring_shots::located(&mirrored).unwrap_err();
@@ -271,7 +271,7 @@ fn a_target_cut_off_by_the_edge_of_the_image_is_numbered_by_its_large_markers() 
     let width = (truth[&(3, 7)].u + 3.0) as u32;
     let height = (truth[&(5, 4)].v + 5.0) as u32;
     let values = (0..width * height)
-        .map(|i| image.values[((i / width) * image.sensor.width + i % width) as usize])
+        .map(|i| image.value(((i / width) * image.sensor.width + i % width) as usize))
         .collect();
     let cut = GrayImage::from_values(SensorSize::new(width, height), values, 255.0).unwrap();
     let located = located(&cut).unwrap();
@@ -294,7 +294,7 @@ fn images_without_the_target_say_why() {
     // Noise alone, from a generator that anybody can write down.
     let mut state = 1_u32;
     let noise = changed(&flat, |_, _, value| value);
-    let values = noise.values.iter().map(|_| {
+    let values = noise.values().map(|_| {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         (state >> 24) as f32
     });

@@ -117,6 +117,20 @@ pub enum CornersError {
         /// The value.
         value: f64,
     },
+    /// A place farther away than anything that is measured.
+    #[error("{}:{line}: {column} is {value:e}; a place is no farther than {most_mm:e} mm from the origin", file.display())]
+    FarPlace {
+        /// The file.
+        file: PathBuf,
+        /// From 1.
+        line: usize,
+        /// The coordinate.
+        column: &'static str,
+        /// The value.
+        value: f64,
+        /// The most, mm.
+        most_mm: f64,
+    },
     /// A pixel off the sensor.
     #[error("{}:{line}: the pixel ({}, {}) lies outside camera \"{camera}\" of {sensor} pixels; its corners reach from ({}, {}) to ({}, {}): the image size in {} does not fit the corners", file.display(), pixel.u, pixel.v, least.u, least.v, most.u, most.v, Dataset::MANIFEST)]
     OutsideImage {
@@ -239,9 +253,14 @@ impl Remedy for CornersError {
             Self::Number { .. } => {
                 "correct the field; poses, rows and columns count from 0".to_owned()
             }
-            Self::UnknownCamera { .. } => {
-                "correct the name, or describe the camera in a [[camera]] of dataset.toml"
-                    .to_owned()
+            Self::UnknownCamera { camera, known, .. } => {
+                let meant = camera.parse().ok().and_then(|k: usize| known.get(k));
+                let counted = meant.map_or(String::new(), |name| {
+                    format!("cameras are called by their names, so {camera} may be {name}; ")
+                });
+                format!(
+                    "{counted}correct the name, or describe the camera in a [[camera]] of dataset.toml"
+                )
             }
             Self::OutOfBoard {
                 rows,
@@ -261,6 +280,10 @@ impl Remedy for CornersError {
                         largest_col + 1
                     )
                 }
+            }
+            Self::FarPlace { .. } => {
+                "correct the coordinate, which is in millimeters, or take the origin nearer"
+                    .to_owned()
             }
             Self::NotFinite { .. } => "leave out corners that were not seen".to_owned(),
             Self::OutsideImage {

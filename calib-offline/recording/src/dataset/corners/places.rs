@@ -34,7 +34,7 @@ impl Labels {
     pub fn of(board: &BoardSpec) -> Self {
         let places = match &board.layout {
             Layout::Points(places) => &places[..],
-            Layout::Grid | Layout::Face(_) => &[],
+            Layout::Grid | Layout::Rectangles(_) | Layout::Face(_) => &[],
         };
         let places = places.iter().enumerate();
         Self(places.map(|(k, place)| (key(&place.at_mm), k)).collect())

@@ -12,6 +12,10 @@ use std::path::Path;
 /// Most columns that a header has.
 const MOST_COLUMNS: usize = 9;
 
+/// Places are no farther from their origin than this, mm: a kilometer. Beyond, a double no longer tells microns apart
+/// after a few sums, and nobody measures with cameras.
+pub(in crate::dataset) const FARTHEST_MM: f64 = 1e6;
+
 /// What a corner is called.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Label {
@@ -30,6 +34,20 @@ pub(super) struct Row {
     pub label: Label,
     pub pixel: PixelPoint,
     pub sigma_px: Option<f64>,
+}
+
+/// A coordinate that is no farther than any measurement goes.
+fn near(value: f64, file: &Path, line: usize, column: &'static str) -> Result<f64, CornersError> {
+    if value.abs() <= FARTHEST_MM {
+        return Ok(value);
+    }
+    Err(CornersError::FarPlace {
+        file: file.to_owned(),
+        line,
+        column,
+        value,
+        most_mm: FARTHEST_MM,
+    })
 }
 
 /// Reads a line.
@@ -83,6 +101,7 @@ pub(super) fn parse(
             value,
         })
     };
+    let place = |text: &str, column| near(finite(text, column)?, file, line, column);
     let sigma = |text: &str, column| match text {
         "" => Ok(None),
         text => match number(text, column)? {
@@ -113,9 +132,9 @@ pub(super) fn parse(
         Labels::Places => {
             // Adding zero makes one zero of the two that there are.
             let at_mm = Vector3::new(
-                finite(fields[4], "x_mm")?,
-                finite(fields[5], "y_mm")?,
-                finite(fields[6], "z_mm")?,
+                place(fields[4], "x_mm")?,
+                place(fields[5], "y_mm")?,
+                place(fields[6], "z_mm")?,
             ) + Vector3::zeros();
             let sigma_mm = sigma(fields[8], "sigma_mm")?.unwrap_or(0.0);
             (

@@ -22,6 +22,7 @@ fn dataset() -> Dataset {
             .into(),
         stage: None,
         known_poses: [].into(),
+        known_poses_file: None,
         excluded_poses: BTreeSet::new(),
         target: None,
         certificate: None,

@@ -51,6 +51,7 @@ pub(super) fn declared(
         "points" => (BoardKind::Points, BoardSpec::points(Vec::new())),
         _ => {
             let board = chessboard(source, line, &raw, certificate.as_ref())?;
+            let board = reader.square_height(board)?;
             (reader.chessboard(&board)?, board)
         }
     };
@@ -172,7 +173,7 @@ fn keys_of(kind: &str) -> &'static [&'static str] {
         ],
         // Points bring their places along: nothing about a grid can be meant.
         "points" => &[],
-        _ => &["rows", "cols", "square_mm", "marked"],
+        _ => &["rows", "cols", "square_mm", "square_height_mm", "marked"],
     }
 }
 
@@ -184,6 +185,10 @@ fn check_keys(source: &Source, raw: &RawBoard, kind: &'static str) -> Result<(),
         ("rows", line(source, raw.rows.as_ref())),
         ("cols", line(source, raw.cols.as_ref())),
         ("square_mm", line(source, raw.square_mm.as_ref())),
+        (
+            "square_height_mm",
+            line(source, raw.square_height_mm.as_ref()),
+        ),
         ("marked", line(source, raw.marked.as_ref())),
         ("marker_mm", line(source, raw.marker_mm.as_ref())),
         ("dictionary", line(source, raw.dictionary.as_ref())),

@@ -78,9 +78,16 @@ pub enum BoardProblem {
         /// Columns of the grid.
         cols: usize,
     },
+    /// Rectangles in as many rows as columns.
+    #[error(
+        "[board] square_height_mm is not square_mm, and rows = cols: after a quarter turn the image is the same"
+    )]
+    WhichSide,
     /// Marked ones that tell no direction.
-    #[error("[board] direction: the grid looks the same {symmetry}")]
+    #[error("[board] {key}: the target looks the same {symmetry}, its marks included")]
     Symmetric {
+        /// The key.
+        key: &'static str,
         /// After which turn or mirror.
         symmetry: TargetSymmetry,
     },
@@ -108,7 +115,10 @@ impl BoardProblem {
             }
             Self::Direction { .. } => "count rows and columns from 0, such as [[3, 4], [1, 2]]",
             Self::Symmetric { .. } => {
-                "leave direction away, or mark so that no turn and no mirror maps the marks onto themselves"
+                "mark others, so that no turn and no mirror maps the marks onto themselves, or leave the key away if none are printed"
+            }
+            Self::WhichSide => {
+                "use a board with unlike counts of rows and columns: only they tell in an image which side of its squares is the higher one"
             }
         };
         text.to_owned()

@@ -377,7 +377,7 @@ impl Remedy for ManifestError {
             Self::Read { .. } | Self::ImageFolder { .. } => "check the path and the permissions",
             Self::NotText { .. } => "save the manifest as UTF-8 text",
             Self::Syntax { .. } => {
-                "correct the line; the keys are [dataset] exclude; [board] kind, rows, cols, square_mm, marked, marker_mm, dictionary, legacy, first_id, tag_mm, spacing, family, border_bits, pitch_mm, diameter_mm, asymmetric, direction, outer_radius_mm, direction_outer_radius_mm; [board.certificate] scale_ppm_sd, flatness_mm_sd, expansion_ppm_per_k, expansion_ppm_per_k_sd, calibrated_at_c, used_at_c, used_at_c_sd; [[camera]] name, width, height, images or image_list, target_images, optics, serial; [recording] name, by, date; [stage] angles_deg, placement; [poses] known; [target] kind, rows, cols, pitch_mm, outer_radius_mm, direction_outer_radius_mm, direction"
+                "correct the line; the keys are [dataset] exclude; [board] kind, rows, cols, square_mm, square_height_mm, marked, marker_mm, dictionary, legacy, first_id, tag_mm, spacing, family, border_bits, pitch_mm, diameter_mm, asymmetric, direction, outer_radius_mm, direction_outer_radius_mm; [board.certificate] scale_ppm_sd, flatness_mm_sd, expansion_ppm_per_k, expansion_ppm_per_k_sd, calibrated_at_c, used_at_c, used_at_c_sd; [[camera]] name, width, height, images or image_list, target_images, optics, serial; [recording] name, by, date; [stage] angles_deg, placement; [poses] known; [target] kind, rows, cols, pitch_mm, outer_radius_mm, direction_outer_radius_mm, direction"
             }
             Self::Missing { .. } => {
                 "add it; rows and cols count inner corners, width and height are pixels"

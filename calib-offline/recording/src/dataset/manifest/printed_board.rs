@@ -6,7 +6,7 @@ use super::limits::{MAX_CORNERS_PER_SIDE, MAX_SQUARE_MM, MIN_CORNERS_PER_SIDE, M
 use super::raw::RawBoard;
 use super::source::{Source, ranged};
 use crate::dataset::description::BoardKind;
-use crate::dataset::target::TargetSpec;
+use crate::dataset::target::{TargetSpec, TargetSymmetry, turned};
 use calib_rays::board::BoardSpec;
 use calib_rays::print::{AprilGrid, Charuco, Circles, Codes, TagBorder};
 use toml::Spanned;
@@ -232,6 +232,13 @@ impl Reader<'_> {
             asymmetric,
             direction,
         };
+        let of_turns = circles.clone();
+        self.check_direction(
+            "direction",
+            &circles.direction,
+            self.raw.direction.as_ref(),
+            |at, quarters| of_turns.turned(at, quarters),
+        )?;
         let spec = if asymmetric {
             BoardSpec::face(rows, cols, |row, col| circles.center_mm(row, col))
         } else {
@@ -278,21 +285,91 @@ impl Reader<'_> {
             images: Vec::new(),
         };
         if let Some(symmetry) = target.symmetry() {
-            return Err(self.problem(self.line, BoardProblem::Symmetric { symmetry }));
+            return Err(self.problem(
+                self.line,
+                BoardProblem::Symmetric {
+                    key: "direction",
+                    symmetry,
+                },
+            ));
         }
         let spec = BoardSpec::chessboard(rows, cols, pitch_mm);
         Ok((BoardKind::Rings(target), spec))
+    }
+
+    /// The board with squares as high as `square_height_mm` says.
+    pub fn square_height(&self, board: BoardSpec) -> Result<BoardSpec, ManifestError> {
+        if self.raw.square_height_mm.is_none() {
+            return Ok(board);
+        }
+        let (height_mm, line) =
+            self.length(self.raw.square_height_mm.as_ref(), "square_height_mm")?;
+        if height_mm == board.square_mm {
+            return Ok(board);
+        }
+        if board.rows == board.cols {
+            return Err(self.problem(line, BoardProblem::WhichSide));
+        }
+        let (rows, cols) = (board.rows, board.cols);
+        Ok(BoardSpec::rectangles(
+            rows,
+            cols,
+            board.square_mm,
+            height_mm,
+        ))
     }
 
     /// Whether some of a chessboard's squares are marked.
     pub fn chessboard(&self, board: &BoardSpec) -> Result<BoardKind, ManifestError> {
         let size = (board.rows + 1, board.cols + 1);
         let marked = self.places_of(self.raw.marked.as_ref(), size)?;
+        // Where its colors tell the turn, any mark will do.
+        if board.looks_same_after_half_turn() {
+            // A quarter turn keeps the colors where both counts are odd numbers of squares.
+            let quarters =
+                board.rows == board.cols && board.rows.is_multiple_of(2) && board.layout.is_even();
+            self.check_direction(
+                "marked",
+                &marked,
+                self.raw.marked.as_ref(),
+                |at, quarters_turned| {
+                    (quarters || quarters_turned == 2).then(|| turned(at, size, quarters_turned))
+                },
+            )?;
+        }
         Ok(if marked.is_empty() {
             BoardKind::Chessboard
         } else {
             BoardKind::MarkedChessboard(marked)
         })
+    }
+
+    /// Refuses marks that a turn maps onto themselves. `turn` says where a place goes by so many quarter turns; `None`
+    /// if that is no turn of the whole target onto itself.
+    fn check_direction(
+        &self,
+        key: &'static str,
+        marked: &[(usize, usize)],
+        raw: Option<&Spanned<Vec<Spanned<Vec<i64>>>>>,
+        turn: impl Fn((usize, usize), u8) -> Option<(usize, usize)>,
+    ) -> Result<(), ManifestError> {
+        if marked.is_empty() {
+            return Ok(());
+        }
+        let line = raw.map_or(self.line, |raw| self.source.line_of(raw));
+        let maps_onto_itself = |quarters: &u8| {
+            let lands_on = |at: &(usize, usize)| {
+                turn(*at, *quarters).is_some_and(|place| marked.contains(&place))
+            };
+            marked.iter().all(lands_on)
+        };
+        match (1..4u8).find(maps_onto_itself) {
+            None => Ok(()),
+            Some(quarters) => {
+                let symmetry = TargetSymmetry::Turn(quarters);
+                Err(self.problem(line, BoardProblem::Symmetric { key, symmetry }))
+            }
+        }
     }
 
     /// The marked places.

@@ -31,6 +31,7 @@ pub(super) struct RawBoard {
     pub rows: Option<Spanned<i64>>,
     pub cols: Option<Spanned<i64>>,
     pub square_mm: Option<Spanned<f64>>,
+    pub square_height_mm: Option<Spanned<f64>>,
     pub marked: Option<Spanned<Vec<Spanned<Vec<i64>>>>>,
     pub marker_mm: Option<Spanned<f64>>,
     pub dictionary: Option<Spanned<String>>,

@@ -20,6 +20,7 @@ fn dataset(names: &[&str]) -> Dataset {
             .collect(),
         stage: None,
         known_poses: [].into(),
+        known_poses_file: None,
         excluded_poses: [].into(),
         target: None,
         certificate: None,

@@ -6,25 +6,39 @@
 //! fitted as crossings with the small squares between the tags.
 
 use super::cells::{Placed, read};
+use super::ends::print_ends;
 use super::found::{Found, PrintedTarget};
+use super::instead::{self, Stated};
 use super::quads::quads;
 use super::saddles::{self, Crossing, Crossings, Label};
 use crate::dataset::image::GrayImage;
 use crate::detect::homography::Homography;
-use crate::detect::seen_board::SeenBoard;
+use crate::detect::seen_board::SeenKind;
 use crate::detect::settings::DetectSettings;
 use crate::detect::turning::turns_like_image;
 use crate::detect::verdict::{Refusal, why_nothing_found};
 use calib_rays::geometry::PixelPoint;
+use calib_rays::numerics::median;
 use calib_rays::observed::Corner;
 use calib_rays::print::{AprilGrid, Code, Codes, TagBorder, TagOrder};
 use nalgebra::{Matrix2, Vector2};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The manifest's word for it.
+const KIND: &str = "aprilgrid";
 
 /// Tags that must be seen; fewer leave no map.
 const MIN_TAGS: usize = 3;
 /// A tag this far, in its own sides, from where the others have it is none of the grid.
 const MAX_ASIDE: f64 = 0.35;
+/// So many tags must lie where their numbers say for each that does not.
+const TAGS_PER_CONTRADICTION: usize = 6;
+/// A tag's corners may lie this far, in its half sides, from where its sides' steps have them.
+const MAX_SHEAR: f64 = 0.45;
+/// Tags are farther apart or nearer than stated beyond this share of their side, ...
+const OTHER_SPACING: f64 = 0.01;
+/// ... if so many pairs of them tell it.
+const MIN_SPACINGS: usize = 6;
 /// How far windows reach towards the next tag, of the space between.
 const REACH: f64 = 0.85;
 
@@ -51,18 +65,110 @@ impl PrintedTarget for AprilGrid {
             (border, tags)
         };
         let (one, two) = (with(TagBorder::One), with(TagBorder::Two));
-        let (border, tags) = if two.1.len() > one.1.len() { two } else { one };
+        let (border, (tags, beyond)) = if two.1.0.len() > one.1.0.len() {
+            two
+        } else {
+            one
+        };
+        let other =
+            |refusal: Refusal| instead::other(image, &Stated::april_grid(self)).unwrap_or(refusal);
         if tags.len() < MIN_TAGS {
-            return Err(other_tags(image, &quads, self).unwrap_or_else(|| why_nothing_found(image)));
+            return Err(other(why_nothing_found(image, KIND)));
         }
-        let rough = rough_corners(self, &tags)?;
+        let without_corners = Refusal::TagsWithoutCorners { tags: tags.len() };
+        // A tag or two may be another object's; numbers that the grid does not have are another grid's.
+        if beyond * TAGS_PER_CONTRADICTION > tags.len() {
+            return Err(other(without_corners));
+        }
+        let (rough, placed_count) = rough_corners(self, &tags).map_err(&other)?;
+        if (tags.len() - placed_count) * TAGS_PER_CONTRADICTION > tags.len() {
+            return Err(other(without_corners));
+        }
         let crossings = crossings(self, border);
         let fitted = saddles::fit(image, &crossings, &rough, settings.max_half_window_px)
-            .filter(|fitted| !fitted.is_empty())
-            .ok_or(Refusal::TagsWithoutCorners { tags: tags.len() })?;
-        Found::of_corners(image, &crossings, &fitted, self.tag_mm)
-            .ok_or(Refusal::TagsWithoutCorners { tags: tags.len() })
+            .filter(|fitted| !fitted.is_empty());
+        let Some(fitted) = fitted else {
+            return Err(other(without_corners));
+        };
+        let pixels: BTreeMap<Label, Vector2<f64>> = fitted
+            .iter()
+            .map(|(&label, c)| (label, Vector2::new(c.pixel.u, c.pixel.v)))
+            .collect();
+        if let Some(refusal) = self.other_spacing(image, &pixels) {
+            return Err(refusal);
+        }
+        if ends_early(image, self, &crossings, &pixels) {
+            return Err(other(without_corners));
+        }
+        Found::of_corners(image, &crossings, &fitted, self.tag_mm).ok_or(without_corners)
     }
+}
+
+trait Measured {
+    fn other_spacing(
+        &self,
+        image: &GrayImage,
+        corners: &BTreeMap<Label, Vector2<f64>>,
+    ) -> Option<Refusal>;
+}
+
+impl Measured for AprilGrid {
+    /// The refusal of a grid whose tags are clearly farther apart, or less far, than stated.
+    fn other_spacing(
+        &self,
+        image: &GrayImage,
+        corners: &BTreeMap<Label, Vector2<f64>>,
+    ) -> Option<Refusal> {
+        let (spacing, count) = instead::spacing_of(corners)?;
+        if count < MIN_SPACINGS || (spacing - self.spacing).abs() <= OTHER_SPACING {
+            return None;
+        }
+        let stated = Stated::april_grid(self);
+        let refusal = instead::other(image, &stated);
+        Some(refusal.unwrap_or_else(|| {
+            let mut seen = stated.board.clone();
+            if let SeenKind::AprilGrid { spacing: apart, .. } = &mut seen.kind {
+                *apart = Some(spacing);
+            }
+            instead::refusal(seen, &stated)
+        }))
+    }
+}
+
+/// Whether the image shows white where the next row or column of tags would be.
+fn ends_early(
+    image: &GrayImage,
+    grid: &AprilGrid,
+    crossings: &Crossings,
+    corners: &BTreeMap<Label, Vector2<f64>>,
+) -> bool {
+    let Some(map) = crossings.map(corners) else {
+        return false;
+    };
+    let tags: BTreeSet<Label> = corners.keys().map(|(r, c)| (r / 2, c / 2)).collect();
+    // The border of a tag, one cell wide or two, and the white beside it.
+    let cell = grid.border_mm(TagBorder::One);
+    let value = |(row, col): Label, aside: f64| {
+        let [x, y] = grid.corner_mm(2 * row, 2 * col);
+        let (low, high) = (aside, grid.tag_mm - aside);
+        let places = [0.3, 0.5, 0.7].map(|part| part * grid.tag_mm);
+        let mut sum = 0.0;
+        for along in places {
+            for (dx, dy) in [(along, low), (along, high), (low, along), (high, along)] {
+                let pixel = map.at(&Vector2::new(x + dx, y + dy));
+                sum += image.between(pixel.x, pixel.y)? / 12.0;
+            }
+        }
+        Some(sum)
+    };
+    let gap = 0.5 * grid.spacing.min(0.4) * grid.tag_mm;
+    let usual = |aside: f64| median(tags.iter().filter_map(|&tag| value(tag, aside)));
+    let (Some(black), Some(white)) = (usual(0.5 * cell), usual(-gap)) else {
+        return false;
+    };
+    print_ends((grid.rows, grid.cols), &tags, |tag| {
+        Some(value(tag, 0.5 * cell)? > black + 0.6 * (white - black))
+    })
 }
 
 /// How a tag's cells lie in its quadrilateral, and the white beside it.
@@ -75,36 +181,43 @@ fn placed(grid: &AprilGrid, border: TagBorder) -> Placed {
     }
 }
 
-/// The tags of a dictionary that are in the image once.
+/// The tags of a dictionary that are in the image once, and how many there are without a wrong cell whose numbers
+/// are none of `ids`.
 fn tags(
     image: &GrayImage,
     quads: &[[Vector2<f64>; 4]],
     codes: &Codes,
     placed: Placed,
     ids: std::ops::Range<usize>,
-) -> Vec<Tag> {
+) -> (Vec<Tag>, usize) {
     let mut by_id: BTreeMap<usize, Vec<Tag>> = BTreeMap::new();
+    let mut beyond = 0;
     for &corners in quads {
-        let code = Homography::of_unit_square(corners)
-            .and_then(|map| read(image, &map, placed))
-            .and_then(|read| codes.nearest(read.cells, ids.clone(), codes.correctable()));
-        if let Some(code) = code {
-            by_id
-                .entry(code.id)
-                .or_default()
-                .push(Tag { code, corners });
+        let read = Homography::of_unit_square(corners).and_then(|map| read(image, &map, placed));
+        let Some(read) = read else { continue };
+        if let Some(code) = codes.nearest(read.cells, ids.clone(), codes.correctable()) {
+            let tag = Tag { code, corners };
+            by_id.entry(code.id).or_default().push(tag);
+        } else {
+            let exact = codes.nearest(read.cells, 0..codes.count(), 0);
+            beyond += usize::from(exact.is_some());
         }
     }
     // A number that is there twice belongs to two boards, or is a mistake.
     let single = by_id.into_values().filter(|tags| tags.len() == 1);
-    single.flatten().collect()
+    (single.flatten().collect(), beyond)
 }
 
-/// The tags' corners by label.
-fn rough_corners(grid: &AprilGrid, tags: &[Tag]) -> Result<BTreeMap<Label, Vector2<f64>>, Refusal> {
+/// The tags' corners by label, and how many of the tags lie where their numbers say.
+fn rough_corners(
+    grid: &AprilGrid,
+    tags: &[Tag],
+) -> Result<(BTreeMap<Label, Vector2<f64>>, usize), Refusal> {
     let order = order(grid, tags).ok_or(Refusal::TagsInLine { tags: tags.len() })?;
     let at = |tag: &Tag| grid.place_of(tag.code.id, order);
     let mut corners = BTreeMap::new();
+    let mut placed_count = 0;
+    let half = 0.5 / (1.0 + grid.spacing);
     for tag in tags {
         let Some((row, col)) = at(tag) else { continue };
         let Some(step) = steps(tags, at, (row, col)) else {
@@ -115,11 +228,18 @@ fn rough_corners(grid: &AprilGrid, tags: &[Tag]) -> Result<BTreeMap<Label, Vecto
         };
         // Tags beside agree with this one's place.
         let agrees = agreeing(tags, at, tag, (row, col), &step);
-        if !agrees {
+        let offsets = tag
+            .corners
+            .map(|corner| step_from_px * (corner - tag.center()));
+        // A grid with another number of columns is sheared: its tags' sides do not follow its steps.
+        let is_square = offsets
+            .iter()
+            .all(|offset| offset.map(|x| (x.abs() / half - 1.0).abs()).amax() < MAX_SHEAR);
+        if !agrees || !is_square {
             continue;
         }
-        for corner in tag.corners {
-            let offset = step_from_px * (corner - tag.center());
+        placed_count += 1;
+        for (corner, offset) in tag.corners.into_iter().zip(offsets) {
             let label = (
                 2 * row + usize::from(offset.y > 0.0),
                 2 * col + usize::from(offset.x > 0.0),
@@ -127,7 +247,7 @@ fn rough_corners(grid: &AprilGrid, tags: &[Tag]) -> Result<BTreeMap<Label, Vecto
             corners.insert(label, corner);
         }
     }
-    Ok(corners)
+    Ok((corners, placed_count))
 }
 
 /// Whether numbers grow upwards or downwards, as seen in the image; `None` if the tags lie in one row or
@@ -240,48 +360,4 @@ fn crossings(grid: &AprilGrid, border: TagBorder) -> Crossings {
         reach: (REACH * gap).min(0.5 * grid.tag_mm),
         covers,
     }
-}
-
-/// What the quadrilaterals are instead, if they are markers of a dictionary.
-fn other_tags(
-    image: &GrayImage,
-    quads: &[[Vector2<f64>; 4]],
-    stated: &AprilGrid,
-) -> Option<Refusal> {
-    let of = |codes: Codes| {
-        let with = |border: TagBorder| {
-            let placed = Placed {
-                side: codes.side(),
-                ..placed(stated, border)
-            };
-            let exact = tags(image, quads, &codes, placed, 0..codes.count());
-            exact.iter().filter(|tag| tag.code.wrong_cells == 0).count()
-        };
-        (with(TagBorder::One).max(with(TagBorder::Two)), codes)
-    };
-    let all = Codes::names().iter().filter_map(|name| Codes::named(name));
-    let mut best: Option<(usize, Codes)> = None;
-    for (count, codes) in all.map(of) {
-        // Of equals the smaller dictionary: the larger ones begin with the same markers.
-        let better = best.is_none_or(|(most, known)| {
-            count > most || (count == most && codes.count() < known.count())
-        });
-        if better {
-            best = Some((count, codes));
-        }
-    }
-    let (count, codes) = best.filter(|(count, _)| *count >= MIN_TAGS)?;
-    Some(Refusal::OtherBoard {
-        stated: format!(
-            "a grid of {} x {} tags of {} from {} on",
-            stated.rows,
-            stated.cols,
-            stated.codes.name(),
-            stated.first_id
-        ),
-        seen: SeenBoard::Markers {
-            dictionary: codes.name(),
-            count,
-        },
-    })
 }

@@ -5,25 +5,35 @@
 
 use super::cells::Placed;
 use super::charuco_parts::{Part, Votes};
+use super::ends::print_ends;
 use super::found::{Found, PrintedTarget};
+use super::instead::{self, Stated};
 use super::saddles::{self, Crossing, Crossings, Label};
 use crate::dataset::image::GrayImage;
 use crate::detect::chessboard::{SIZES, parts_at};
+use crate::detect::corner_fit::FittedCorner;
 use crate::detect::grid::Node;
 use crate::detect::labelling::Placement;
 use crate::detect::settings::DetectSettings;
 use crate::detect::verdict::{Refusal, why_nothing_found};
+use calib_rays::numerics::median;
 use calib_rays::print::Charuco;
 use nalgebra::Vector2;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The manifest's word for it.
+const KIND: &str = "charuco";
 
 /// Fewest corners of a part that is looked at.
 const MIN_CORNERS: usize = 4;
+/// Corners of a part that may lie off the board: so many, ...
+const MAX_STRAYS: usize = 2;
+/// ... and one in so many.
+const CORNERS_PER_STRAY: usize = 50;
 
 impl PrintedTarget for Charuco {
     fn find(&self, image: &GrayImage, settings: &DetectSettings) -> Result<Found, Refusal> {
         let mut best: Option<BTreeMap<Label, Vector2<f64>>> = None;
-        let mut seen: Vec<Part> = Vec::new();
         for size in SIZES {
             let have = best.as_ref().map_or(0, BTreeMap::len);
             let count = self.rows * self.cols;
@@ -36,24 +46,86 @@ impl PrintedTarget for Charuco {
             if rough.len() > have + have / 10 {
                 best = Some(rough);
             }
-            seen.extend(parts);
         }
         let crossings = crossings(self);
         let fitted = best
             .and_then(|rough| saddles::fit(image, &crossings, &rough, settings.max_half_window_px));
+        let other = || {
+            instead::other(image, &Stated::charuco(self))
+                .unwrap_or_else(|| why_nothing_found(image, KIND))
+        };
         match fitted {
             Some(fitted) if fitted.len() >= MIN_CORNERS => {
+                if ends_early(image, self, &crossings, &fitted) {
+                    return Err(other());
+                }
                 Found::of_corners(image, &crossings, &fitted, self.square_mm)
-                    .ok_or(Refusal::NoBoard)
+                    .ok_or(Refusal::NoBoard { kind: KIND })
             }
-            _ => {
-                let largest = seen.iter().max_by_key(|part| part.0.len());
-                Err(largest
-                    .and_then(|part| super::charuco_seen::what(image, part, self))
-                    .unwrap_or_else(|| why_nothing_found(image)))
-            }
+            _ => Err(other()),
         }
     }
+}
+
+/// Where in an outer black square it is looked at, in squares from the line of corners before it: a margin may
+/// begin half a square behind it.
+const INTO_SQUARE: f64 = 0.25;
+
+/// Whether the image shows white where the next row or column of black squares would be.
+fn ends_early(
+    image: &GrayImage,
+    board: &Charuco,
+    crossings: &Crossings,
+    fitted: &BTreeMap<Label, FittedCorner>,
+) -> bool {
+    let pixels: BTreeMap<Label, Vector2<f64>> = fitted
+        .iter()
+        .map(|(&label, c)| (label, Vector2::new(c.pixel.u, c.pixel.v)))
+        .collect();
+    let (Some(map), Some(mean), Some(amplitude)) = (
+        crossings.map(&pixels),
+        median(fitted.values().map(|c| c.mean)),
+        median(fitted.values().map(|c| c.amplitude.abs())),
+    ) else {
+        return false;
+    };
+    let labels: BTreeSet<Label> = fitted.keys().copied().collect();
+    let bounds = |of: fn(&Label) -> usize| {
+        let values = labels.iter().map(of);
+        values.fold((usize::MAX, 0), |(low, high), k| (low.min(k), high.max(k)))
+    };
+    let ((top, bottom), (left, right)) = (bounds(|l| l.0), bounds(|l| l.1));
+    print_ends((board.rows, board.cols), &labels, |(row, col)| {
+        // The square beyond that corner, away from those found.
+        let (down, along) = if row < top {
+            ((row, -INTO_SQUARE), (col, 0.5))
+        } else if row > bottom {
+            ((row + 1, INTO_SQUARE), (col, 0.5))
+        } else if col < left {
+            ((row, 0.5), (col, -INTO_SQUARE))
+        } else if col > right {
+            ((row, 0.5), (col + 1, INTO_SQUARE))
+        } else {
+            return None;
+        };
+        let square_row = if row >= top && row <= bottom {
+            row + 1
+        } else {
+            down.0
+        };
+        let square_col = if col >= left && col <= right {
+            col + 1
+        } else {
+            along.0
+        };
+        if !board.is_black(square_row, square_col) {
+            return None;
+        }
+        let at = Vector2::new(col as f64 + along.1, row as f64 + down.1) * board.square_mm;
+        let pixel = map.at(&at);
+        let value = image.between(pixel.x, pixel.y)?;
+        Some(value > mean + 0.3 * amplitude)
+    })
 }
 
 /// The board's corners, and the markers that are none of them.
@@ -105,12 +177,14 @@ fn placed_parts(
             let cells = part.read_cells(image, placed(board));
             let votes = Votes::of(board, &cells);
             let placement = votes.agreed()?;
-            let labelled = part
+            let labelled: BTreeMap<Label, Vector2<f64>> = part
                 .0
                 .iter()
                 .filter_map(|(&node, &pixel)| Some((label(&placement, board, node)?, pixel)))
                 .collect();
-            Some((votes.agreeing, labelled))
+            let off_board = part.0.len() - labelled.len();
+            (off_board <= MAX_STRAYS + part.0.len() / CORNERS_PER_STRAY)
+                .then_some((votes.agreeing, labelled))
         })
         .collect();
     // Where two parts claim one corner, there are two such boards: the one that shows more counts.

@@ -12,6 +12,8 @@ use std::collections::BTreeMap;
 
 /// Markers that must agree on a place; a marker with a wrong cell counts half.
 const MIN_AGREEING: f64 = 2.0;
+/// So many must agree for each without a wrong cell that does not: a first number off by one leaves one in every row.
+const AGREEING_PER_CONTRADICTION: f64 = 8.0;
 
 /// A marker read in a cell of a part: the cell's node nearest to the origin, and what was read.
 #[derive(Debug, Clone, Copy)]
@@ -78,6 +80,17 @@ impl Part {
         })
     }
 
+    /// The map of a cell in or beside the part.
+    pub fn map_between(&self, cell: Node) -> Option<Homography> {
+        let (map, (x, y)) = self.map_of(cell)?;
+        Homography::of_unit_square([
+            map.at(x, y),
+            map.at(x + 1.0, y),
+            map.at(x + 1.0, y + 1.0),
+            map.at(x, y + 1.0),
+        ])
+    }
+
     /// Every cell in or beside the part, and its map.
     pub fn cells(&self) -> Vec<(Node, Homography)> {
         let mut cells: Vec<Node> = self
@@ -87,16 +100,9 @@ impl Part {
             .collect();
         cells.sort_unstable();
         cells.dedup();
-        let mapped = cells.into_iter().filter_map(|cell| {
-            let (map, (x, y)) = self.map_of(cell)?;
-            let own = Homography::of_unit_square([
-                map.at(x, y),
-                map.at(x + 1.0, y),
-                map.at(x + 1.0, y + 1.0),
-                map.at(x, y + 1.0),
-            ])?;
-            Some((cell, own))
-        });
+        let mapped = cells
+            .into_iter()
+            .filter_map(|cell| Some((cell, self.map_between(cell)?)));
         mapped.collect()
     }
 
@@ -124,8 +130,11 @@ pub struct Votes {
     placement: Option<Placement>,
     /// Markers that agree on it; one with a wrong cell counts half.
     pub agreeing: f64,
-    /// Markers without a wrong cell that say something else.
+    /// Markers without a wrong cell that say something else, or that the board does not have.
     pub against: f64,
+    /// Whether the agreeing markers leave the pattern open: they lie in every other row of squares only,
+    /// and there the old pattern and the new one have the same.
+    is_pattern_open: bool,
 }
 
 impl Votes {
@@ -133,6 +142,8 @@ impl Votes {
     pub fn of(board: &Charuco, cells: &[ReadCell]) -> Self {
         let mut votes: BTreeMap<Placement, f64> = BTreeMap::new();
         let mut exact: BTreeMap<Placement, f64> = BTreeMap::new();
+        let mut rows: BTreeMap<Placement, [bool; 2]> = BTreeMap::new();
+        let mut beyond = 0.0;
         let squares = squares_by_id(board);
         for cell in cells {
             let ids = board.first_id..board.first_id + board.marker_count();
@@ -140,6 +151,8 @@ impl Votes {
                 .codes
                 .nearest(cell.cells, ids, board.codes.correctable())
             else {
+                let all = 0..board.codes.count();
+                beyond += f64::from(u8::from(board.codes.nearest(cell.cells, all, 0).is_some()));
                 continue;
             };
             let Some(&square) = squares.get(code.id - board.first_id) else {
@@ -149,20 +162,25 @@ impl Votes {
             let is_exact = code.wrong_cells == 0;
             *votes.entry(placement).or_default() += if is_exact { 1.0 } else { 0.5 };
             *exact.entry(placement).or_default() += f64::from(u8::from(is_exact));
+            rows.entry(placement).or_default()[square.0 % 2] = true;
         }
         let best = votes.iter().max_by(|a, b| a.1.total_cmp(b.1));
         let (placement, agreeing) = best.map_or((None, 0.0), |(&p, &n)| (Some(p), n));
         let against = exact.iter().filter(|(p, _)| Some(**p) != placement);
+        let both_rows = placement.and_then(|p| rows.get(&p)) == Some(&[true, true]);
         Self {
             placement,
             agreeing,
-            against: against.map(|(_, n)| n).sum(),
+            against: against.map(|(_, n)| n).sum::<f64>() + beyond,
+            is_pattern_open: (board.rows + 1).is_multiple_of(2) && !both_rows,
         }
     }
 
     /// The place, if the markers leave no doubt.
     pub fn agreed(&self) -> Option<Placement> {
-        let clear = self.agreeing >= MIN_AGREEING && self.agreeing > 3.0 * self.against;
+        let clear = self.agreeing >= MIN_AGREEING
+            && self.agreeing >= AGREEING_PER_CONTRADICTION * self.against
+            && !self.is_pattern_open;
         self.placement.filter(|_| clear)
     }
 }

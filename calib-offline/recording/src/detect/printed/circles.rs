@@ -6,7 +6,9 @@
 //! with a hole, or clearly larger or smaller than most. A grid that looks the same after a turn gets the
 //! numbering whose columns count to the right in the image, or nearest to it.
 
+use super::ends::circles_end;
 use super::found::{Found, PrintedTarget, quarter_turns};
+use super::instead::{self, Stated};
 use super::smooth::keep_smooth;
 use crate::dataset::image::GrayImage;
 use crate::detect::illegible::EDGE_WIDTH_OF_BLUR;
@@ -15,10 +17,9 @@ use crate::detect::ring_target::grid::{Cells, largest_grid};
 use crate::detect::ring_target::local_map::{LocalMap, MIN_POINTS};
 use crate::detect::ring_target::markers::{
     Label, Marker, Markers, checked_cells, complete, corrected, fitted_candidates, grid_point,
-    leave_out_poor, node,
+    leave_out_poor, node, target_map,
 };
 use crate::detect::ring_target::ring_fit::FittedRing;
-use crate::detect::seen_board::SeenBoard;
 use crate::detect::settings::DetectSettings;
 use crate::detect::verdict::{ImageFigures, Refusal, why_nothing_found};
 use calib_rays::numerics::median;
@@ -28,14 +29,22 @@ use nalgebra::Vector2;
 use std::collections::BTreeMap;
 use std::f64::consts::SQRT_2;
 
+/// The manifest's word for it.
+const KIND: &str = "circles";
+
 /// The window around a circle ends here at the latest, radii from its middle.
 const MAX_REACH: f64 = 1.6;
 /// How often centers are corrected; the second time the map is free of the first error.
 const CORRECTIONS: usize = 2;
 /// A circle so much larger or smaller than most is marked.
 const MARKED_SIZE: f64 = 1.15;
-/// One circle in so many may contradict.
-const CIRCLES_PER_CONTRADICTION: usize = 20;
+/// One circle in so many, and no more than two, may lie off the grid.
+const CIRCLES_PER_STRAY: usize = 20;
+const MAX_STRAYS: usize = 2;
+/// So many circles are marked as stated for each that is not.
+const MARKS_PER_CONTRADICTION: usize = 5;
+/// A diameter is another one beyond this.
+const OTHER_DIAMETER: f64 = 1.15;
 
 /// The residual of a circle's fit may be so many times the usual one, ...
 const MAX_RESIDUAL_OF_MEDIAN: f64 = 1.5;
@@ -46,8 +55,12 @@ const LEAST_RESIDUAL: f64 = 0.01;
 #[derive(Debug, Clone, Copy)]
 struct Seen {
     cell: (i64, i64),
-    is_marked: bool,
+    /// `None` where it is unclear: something covers it in part.
+    is_marked: Option<bool>,
 }
+
+/// A circle of the turned lattice, in pitches, and whether it is marked.
+type Turned = ((i64, i64), Option<bool>);
 
 /// A place of the lattice on the grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,9 +81,18 @@ impl PrintedTarget for Circles {
         let rings = fitted_candidates(image, Sought::RingsAndDisks, count, reach);
         let nodes: Vec<_> = rings.iter().map(node).collect();
         let cells = largest_grid(&nodes, (radius, radius));
-        let (cells, map) = checked_cells(&rings, cells).map_err(|_| why_nothing_found(image))?;
+        let other =
+            |refusal: Refusal| instead::other(image, &Stated::circles(self)).unwrap_or(refusal);
+        let (cells, map) =
+            checked_cells(&rings, cells).map_err(|_| other(why_nothing_found(image, KIND)))?;
+        let measured = instead::measured_diameter(&rings, &cells, &map).unwrap_or(0.0);
+        let hollow = cells.keys().filter(|i| rings[**i].ratio > 0.0).count();
+        let as_wide = 1.0 / OTHER_DIAMETER..OTHER_DIAMETER;
+        if 2 * hollow > cells.len() || !as_wide.contains(&(measured / (2.0 * radius))) {
+            return Err(other(Refusal::NoBoard { kind: KIND }));
+        }
         let seen = marked(&rings, &cells, &map);
-        let place = self.placed(&seen, &map)?;
+        let place = self.placed(&seen, &map).map_err(&other)?;
         let mut labelled: BTreeMap<Label, FittedRing> = cells
             .iter()
             .filter_map(|(&i, &cell)| Some((self.label(cell, &place)?, rings[i])))
@@ -87,10 +109,13 @@ impl PrintedTarget for Circles {
         keep_smooth(&mut pixels, |label| markers.get(label).map(|m| m.at));
         labelled.retain(|label, _| pixels.contains_key(label));
         if labelled.len() < MIN_POINTS {
-            return Err(why_nothing_found(image));
+            return Err(other(why_nothing_found(image, KIND)));
+        }
+        if circles_end((self.rows, self.cols), image, &markers, &labelled) {
+            return Err(other(Refusal::NoBoard { kind: KIND }));
         }
         self.found(image, &markers, &labelled)
-            .ok_or(Refusal::NoBoard)
+            .ok_or(Refusal::NoBoard { kind: KIND })
     }
 
     fn numberings(&self) -> u8 {
@@ -122,15 +147,17 @@ fn marked(rings: &[FittedRing], cells: &Cells, map: &LocalMap) -> Vec<Seen> {
     };
     let usual = median(cells.iter().map(|(&i, &cell)| size(i, cell))).unwrap_or(1.0);
     let ordinary = 1.0 / MARKED_SIZE..MARKED_SIZE;
-    let hollow = cells.keys().filter(|i| rings[**i].ratio > 0.0).count();
-    // Where most are rings, a hole is no mark.
-    let holes_mark = 2 * hollow < cells.len();
+    let residual = |i: usize| rings[i].residual_rms / rings[i].contrast.abs();
+    let usual_residual = median(cells.keys().map(|&i| residual(i))).unwrap_or(0.0);
+    let limit = MAX_RESIDUAL_OF_MEDIAN * usual_residual + LEAST_RESIDUAL;
     cells
         .iter()
-        .map(|(&i, &cell)| Seen {
-            cell,
-            is_marked: !ordinary.contains(&(size(i, cell) / usual))
-                || (holes_mark && rings[i].ratio > 0.0),
+        .map(|(&i, &cell)| {
+            let is_marked = !ordinary.contains(&(size(i, cell) / usual)) || rings[i].ratio > 0.0;
+            Seen {
+                cell,
+                is_marked: (residual(i) <= limit).then_some(is_marked),
+            }
         })
         .collect()
 }
@@ -138,10 +165,15 @@ fn marked(rings: &[FittedRing], cells: &Cells, map: &LocalMap) -> Vec<Seen> {
 trait OnGrid {
     fn label_at(&self, at: (i64, i64)) -> Option<Label>;
     fn label(&self, cell: (i64, i64), place: &Place) -> Option<Label>;
-    fn turned(&self, cell: (i64, i64), quarter_turns: u8) -> (i64, i64);
+    fn cell_turned(&self, cell: (i64, i64), quarter_turns: u8) -> (i64, i64);
     fn placed(&self, seen: &[Seen], map: &LocalMap) -> Result<Place, Refusal>;
     fn places(&self, seen: &[Seen]) -> Vec<(usize, Place)>;
-    fn other(&self, seen: &[Seen]) -> Refusal;
+    fn contradictions(
+        &self,
+        turned: &[Turned],
+        shift: (i64, i64),
+        most_strays: usize,
+    ) -> Option<usize>;
     fn markers(&self, labelled: &BTreeMap<Label, FittedRing>) -> Markers;
     fn found(
         &self,
@@ -166,12 +198,12 @@ impl OnGrid for Circles {
     }
 
     fn label(&self, cell: (i64, i64), place: &Place) -> Option<Label> {
-        let (x, y) = self.turned(cell, place.quarter_turns);
+        let (x, y) = self.cell_turned(cell, place.quarter_turns);
         self.label_at((x + place.shift.0, y + place.shift.1))
     }
 
     /// A cell in pitches, turned.
-    fn turned(&self, (a, b): (i64, i64), quarter_turns: u8) -> (i64, i64) {
+    fn cell_turned(&self, (a, b): (i64, i64), quarter_turns: u8) -> (i64, i64) {
         let at = if self.asymmetric {
             (a - b, a + b)
         } else {
@@ -182,12 +214,15 @@ impl OnGrid for Circles {
 
     fn placed(&self, seen: &[Seen], map: &LocalMap) -> Result<Place, Refusal> {
         let places = self.places(seen);
-        let allowed = seen.len() / CIRCLES_PER_CONTRADICTION;
         let Some(&(least, _)) = places.first() else {
-            return Err(self.other(seen));
+            return Err(Refusal::NoBoard { kind: KIND });
         };
-        if least > allowed {
-            return Err(self.other(seen));
+        if self.direction.is_empty() {
+            // Marks that are not stated.
+            let marks = seen.iter().filter(|s| s.is_marked == Some(true)).count();
+            if marks * CIRCLES_PER_STRAY >= seen.len() + CIRCLES_PER_STRAY {
+                return Err(Refusal::NoBoard { kind: KIND });
+            }
         }
         let margin = if self.direction.is_empty() { 1 } else { 2 };
         let close: Vec<Place> = places
@@ -224,7 +259,7 @@ impl OnGrid for Circles {
         close
             .into_iter()
             .max_by(|a, b| to_the_right(a).total_cmp(&to_the_right(b)))
-            .ok_or(Refusal::NoBoard)
+            .ok_or(Refusal::NoBoard { kind: KIND })
     }
 
     /// Places with few contradictions, best first.
@@ -234,14 +269,14 @@ impl OnGrid for Circles {
             .max()
             .unwrap_or(0);
         let last_y = self.rows as i64 - 1;
-        let most = seen.len() / CIRCLES_PER_CONTRADICTION + 2;
+        let most_strays = (seen.len() / CIRCLES_PER_STRAY).min(MAX_STRAYS);
         let mut places = Vec::new();
         for quarter_turns in 0..4 {
             let turned: Vec<_> = seen
                 .iter()
-                .map(|s| (self.turned(s.cell, quarter_turns), s.is_marked))
+                .map(|s| (self.cell_turned(s.cell, quarter_turns), s.is_marked))
                 .collect();
-            let range = |of: fn(&((i64, i64), bool)) -> i64, last: i64| {
+            let range = |of: fn(&Turned) -> i64, last: i64| {
                 let low = turned.iter().map(of).min().unwrap_or(0);
                 let high = turned.iter().map(of).max().unwrap_or(0);
                 // A stray circle or two may lie beyond the grid.
@@ -249,24 +284,14 @@ impl OnGrid for Circles {
             };
             for dy in range(|t| t.0.1, last_y) {
                 for dx in range(|t| t.0.0, last_x) {
-                    let contradictions = turned
-                        .iter()
-                        .filter(|((x, y), is_marked)| {
-                            self.label_at((x + dx, y + dy)).is_none_or(|(row, col)| {
-                                !self.direction.is_empty() && self.is_marked(row, col) != *is_marked
-                            })
-                        })
-                        .take(most + 1)
-                        .count();
-                    if contradictions <= most {
-                        let shift = (dx, dy);
-                        places.push((
-                            contradictions,
-                            Place {
-                                quarter_turns,
-                                shift,
-                            },
-                        ));
+                    let shift = (dx, dy);
+                    let counted = self.contradictions(&turned, shift, most_strays);
+                    if let Some(contradictions) = counted {
+                        let place = Place {
+                            quarter_turns,
+                            shift,
+                        };
+                        places.push((contradictions, place));
                     }
                 }
             }
@@ -275,34 +300,30 @@ impl OnGrid for Circles {
         places
     }
 
-    /// Why the circles are no part of the grid.
-    fn other(&self, seen: &[Seen]) -> Refusal {
-        let turned: Vec<_> = seen.iter().map(|s| self.turned(s.cell, 0)).collect();
-        let span = |of: fn(&(i64, i64)) -> i64| {
-            let low = turned.iter().map(of).min().unwrap_or(0);
-            let high = turned.iter().map(of).max().unwrap_or(0);
-            (high - low + 1) as usize
-        };
-        let (w, h) = (span(|t| t.0), span(|t| t.1));
-        let kind = if self.asymmetric {
-            "asymmetric"
-        } else {
-            "symmetric"
-        };
-        let (rows, cols) = if self.asymmetric {
-            (h.max(w), h.min(w).div_ceil(2))
-        } else {
-            (h.min(w), h.max(w))
-        };
-        Refusal::OtherBoard {
-            stated: format!("a grid of {} x {} circles, {kind}", self.rows, self.cols),
-            seen: SeenBoard::Circles {
-                rows,
-                cols,
-                asymmetric: self.asymmetric,
-                marked: seen.iter().filter(|s| s.is_marked).count(),
-            },
+    /// Circles off the grid, and those that are marked and should not be or the other way round; `None` if that
+    /// is too many.
+    fn contradictions(
+        &self,
+        turned: &[Turned],
+        (dx, dy): (i64, i64),
+        most_strays: usize,
+    ) -> Option<usize> {
+        let (mut strays, mut agreeing, mut wrong) = (0, 0, 0);
+        for ((x, y), is_marked) in turned {
+            let Some((row, col)) = self.label_at((x + dx, y + dy)) else {
+                strays += 1;
+                if strays > most_strays {
+                    return None;
+                }
+                continue;
+            };
+            if let (Some(is_marked), false) = (is_marked, self.direction.is_empty()) {
+                let stated = self.is_marked(row, col);
+                agreeing += usize::from(*is_marked && stated);
+                wrong += usize::from(*is_marked != stated);
+            }
         }
+        (wrong * MARKS_PER_CONTRADICTION <= agreeing + wrong).then_some(strays + wrong)
     }
 
     /// The circles as printed, in pitches; marked ones as they are seen.
@@ -331,7 +352,7 @@ impl OnGrid for Circles {
     ) -> Option<Found> {
         let median_of = |of: fn(&FittedRing) -> f64| median(labelled.values().map(of));
         let contrast = median_of(|ring| ring.contrast.abs())?;
-        let map = crate::detect::ring_target::markers::target_map(markers, labelled)?;
+        let map = target_map(markers, labelled)?;
         let seen = labelled.keys().filter_map(|label| markers.get(label));
         let pitch_px = median(seen.clone().map(|marker| {
             let sides = map.derivative(&marker.at);

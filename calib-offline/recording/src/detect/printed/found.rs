@@ -4,8 +4,10 @@ use super::saddles::{Crossings, Label};
 use crate::dataset::image::GrayImage;
 use crate::detect::corner_fit::FittedCorner;
 use crate::detect::illegible::EDGE_WIDTH_OF_BLUR;
+use crate::detect::scatter::{Scattered, beyond_predicted_px};
 use crate::detect::settings::DetectSettings;
 use crate::detect::verdict::{ImageFigures, Refusal};
+use calib_rays::board::BoardSpec;
 use calib_rays::numerics::median;
 use calib_rays::observed::Corner;
 use nalgebra::Vector2;
@@ -29,8 +31,7 @@ pub trait PrintedTarget: Sync {
 /// What was found in one image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
-    /// The points by row and column; standard deviations without the floor for what every model leaves
-    /// out.
+    /// The points by row and column; standard deviations as each fit predicts them.
     pub corners: Vec<Corner>,
     /// What was measured.
     pub figures: ImageFigures,
@@ -39,6 +40,21 @@ pub struct Found {
 }
 
 impl Found {
+    /// Standard deviation per axis that the points have beyond what their fits predict, px; `None` if too few are
+    /// there to tell.
+    pub fn model_error_px(&self, board: &BoardSpec) -> Option<f64> {
+        let points: Vec<Scattered> = self
+            .corners
+            .iter()
+            .map(|c| Scattered {
+                place: board.corner_in_board(c.row, c.col).xy(),
+                pixel: Vector2::new(c.pixel.u, c.pixel.v),
+                sigma_px: c.sigma_px.unwrap_or(0.0),
+            })
+            .collect();
+        beyond_predicted_px(&points, self.figures.square_px)
+    }
+
     /// Fitted crossings as points; `square` is the side of the usual square in the target's plane.
     pub(super) fn of_corners(
         image: &GrayImage,

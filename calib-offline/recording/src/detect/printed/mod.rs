@@ -9,9 +9,10 @@ pub mod april_grid;
 pub mod cells;
 pub mod charuco;
 pub mod charuco_parts;
-pub mod charuco_seen;
 pub mod circles;
+mod ends;
 pub mod found;
+pub(super) mod instead;
 pub mod quads;
 pub mod rings;
 pub mod saddles;
@@ -21,13 +22,15 @@ mod turns;
 use super::detection::Detection;
 use super::error::DetectError;
 use super::job::{Job, all_loaded};
+use super::scatter;
 use super::settings::DetectSettings;
-use super::verdict::{ImageVerdict, MissingCorner, Outcome};
+use super::verdict::{ImageVerdict, MissingCorner, Outcome, Refusal};
+use super::wrong_count;
 use crate::dataset::image::GrayImage;
 use crate::dataset::{BoardKind, Dataset};
-use calib_rays::observed::{Corner, View};
+use calib_rays::observed::View;
 use calib_rays::progress::Progress;
-use found::PrintedTarget;
+use found::{Found, PrintedTarget};
 use rayon::prelude::*;
 
 /// The target that a dataset's kind is, if its print tells its points apart.
@@ -61,7 +64,12 @@ pub(super) fn detect(
         .collect();
     progress.end();
     let mut found = all_loaded(dataset, jobs, loaded)?;
-    turns::settle(target, dataset, jobs, &mut found);
+    turns::settle(target, dataset, jobs, &mut found)?;
+    add_model_error(dataset, jobs, &mut found, settings);
+    wrong_count::check_targets(
+        found.iter().filter_map(|found| found.as_ref().err()),
+        found.iter().flatten().count(),
+    )?;
     let mut views = Vec::new();
     let mut images = Vec::new();
     for (job, found) in jobs.iter().zip(found) {
@@ -71,7 +79,11 @@ pub(super) fn detect(
                 let corner_count = found.corners.len();
                 let labels = found.corners.iter().map(|corner| (corner.row, corner.col));
                 missing = MissingCorner::beside(labels, &dataset.board);
-                views.push(view(job, found.corners, settings));
+                views.push(View {
+                    camera_idx: job.camera_idx,
+                    pose: job.pose,
+                    corners: found.corners,
+                });
                 let outcome = Outcome::Used {
                     corner_count,
                     partial: corner_count < dataset.board.corner_count(),
@@ -93,14 +105,31 @@ pub(super) fn detect(
     Ok(Detection::of(views, images))
 }
 
-fn view(job: &Job<'_>, corners: Vec<Corner>, settings: &DetectSettings) -> View {
-    let with_floor = |corner: Corner| Corner {
-        sigma_px: corner.sigma_px.map(|s| s.hypot(settings.sigma_floor_px)),
-        ..corner
-    };
-    View {
-        camera_idx: job.camera_idx,
-        pose: job.pose,
-        corners: corners.into_iter().map(with_floor).collect(),
+/// Adds to the points' standard deviations what the fits leave out: the points' scatter about a smooth map, of all
+/// images of a camera together, or the floor where no image tells.
+fn add_model_error(
+    dataset: &Dataset,
+    jobs: &[Job<'_>],
+    found: &mut [Result<Found, Refusal>],
+    settings: &DetectSettings,
+) {
+    for camera_idx in 0..dataset.cameras.len() {
+        let of_camera = jobs.iter().zip(found.iter_mut());
+        let of_camera = of_camera.filter(|(job, _)| job.camera_idx == camera_idx);
+        let mut seen: Vec<(&mut Found, Option<f64>)> = of_camera
+            .filter_map(|(_, found)| found.as_mut().ok())
+            .map(|found| {
+                let model_error_px = found.model_error_px(&dataset.board);
+                (found, model_error_px)
+            })
+            .collect();
+        scatter::pool(seen.iter_mut().map(|(_, model_error_px)| model_error_px));
+        for (found, model_error_px) in seen {
+            let beyond_px = model_error_px.unwrap_or(settings.sigma_floor_px);
+            for corner in &mut found.corners {
+                corner.sigma_px = corner.sigma_px.map(|sigma| sigma.hypot(beyond_px));
+            }
+            found.figures.sigma_px = found.figures.sigma_px.hypot(beyond_px);
+        }
     }
 }

@@ -189,7 +189,7 @@ impl Crossings {
 
     /// The image without its other print: those pixels have no value.
     fn covered(&self, image: &GrayImage, map: &LocalMap, blur_px: f64) -> GrayImage {
-        let mut covered = image.clone();
+        let mut places = Vec::new();
         let spread_px = COVERED_BLURS * blur_px + COVERED_PX;
         for &[left, right, upper, lower] in &self.covers {
             let middle = Vector2::new((left + right) / 2.0, (upper + lower) / 2.0);
@@ -222,11 +222,13 @@ impl Crossings {
                 for u in range(center.x, reach_u, image.sensor.width) {
                     let offset = plane_from_px * (Vector2::new(u as f64, v as f64) - center);
                     if offset.x.abs() <= half_x && offset.y.abs() <= half_y {
-                        covered.values[v as usize * width + u as usize] = f32::NAN;
+                        places.push(v as usize * width + u as usize);
                     }
                 }
             }
         }
+        let mut covered = image.clone();
+        covered.cover(places.into_iter());
         covered
     }
 }

@@ -78,7 +78,7 @@ pub fn standing_out(
         Polarity::Dark => -1.0,
         Polarity::Bright => 1.0,
     };
-    (0..image.values.len())
+    (0..image.values().len())
         .map(|i| {
             let (u, v) = (i % width, i / width);
             let here = means.mean(u, v, 1);
@@ -103,7 +103,7 @@ impl BoxMeans {
         for v in 0..height {
             let mut row = 0.0;
             for u in 0..width {
-                row += f64::from(image.values[v * width + u]);
+                row += f64::from(image.value(v * width + u));
                 sums[(v + 1) * (width + 1) + u + 1] = sums[v * (width + 1) + u + 1] + row;
             }
         }

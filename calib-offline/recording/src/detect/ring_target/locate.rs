@@ -98,6 +98,11 @@ pub fn locate(
     })
 }
 
+/// The markers as they are printed, in pitches.
+pub(in crate::detect) fn printed(target: &TargetSpec) -> Markers {
+    Radii::of(target).markers(target)
+}
+
 /// Lengths of the target in pitches.
 struct Radii {
     ordinary: f64,

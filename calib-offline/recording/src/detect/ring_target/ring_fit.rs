@@ -33,10 +33,11 @@ const MIN_PIXELS: usize = 40;
 /// this, px, or is blurred so much that the band was too narrow.
 const SAME_WINDOW_PX: f64 = 0.5;
 const ROUNDS: usize = 2;
-/// A step of all lengths below so many pixels ends the iteration.
+/// A step of all lengths below so many pixels ends the iteration: what is left after it is its square, far below what
+/// noise does.
 const LIMITS: Limits = Limits {
     iterations: 30,
-    step: 1e-5,
+    step: 1e-3,
     placing: 5,
 };
 /// Blur is kept between these bounds while iterating, px.
@@ -144,13 +145,15 @@ impl RingModel {
     fn start(image: &GrayImage, guess: &RingGuess, reach: f64) -> Option<Self> {
         let inverse = guess.shape.try_inverse()?;
         let between = 1.0 - guess.ratio;
+        // Beside the ring begins here, unless the window ends soon after.
+        let beside = (1.0 + 0.25 * between).min(f64::midpoint(1.0, reach));
         let (mut print, mut around) = ((0.0, 0.0), (0.0, 0.0));
         for (at, value) in pixels_around(image, &guess.center, &guess.shape, reach)? {
             let radius = (inverse * (at - guess.center)).norm();
             let depth = (radius - guess.ratio) / between;
             if (0.25..0.75).contains(&depth) {
                 print = (print.0 + value, print.1 + 1.0);
-            } else if !(-0.25..1.25).contains(&depth) {
+            } else if depth < -0.25 || radius >= beside {
                 around = (around.0 + value, around.1 + 1.0);
             }
         }

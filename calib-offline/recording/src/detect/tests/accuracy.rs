@@ -100,6 +100,7 @@ fn real_images_are_found_whole() {
         cameras: vec![camera("left"), camera("right")],
         stage: None,
         known_poses: [].into(),
+        known_poses_file: None,
         excluded_poses: std::collections::BTreeSet::new(),
         target: None,
         certificate: None,

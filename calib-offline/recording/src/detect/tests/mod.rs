@@ -3,6 +3,7 @@
 mod accuracy;
 mod datasets;
 mod exact;
+mod noise;
 mod photo;
 mod sharp;
 mod single;
@@ -50,6 +51,7 @@ fn dataset(folder: &Path, board: BoardSpec, stage: bool, cameras: &[Vec<Photo>])
         cameras,
         stage: stage.then(StageSpec::default),
         known_poses: [].into(),
+        known_poses_file: None,
         excluded_poses: std::collections::BTreeSet::new(),
         target: None,
         certificate: None,

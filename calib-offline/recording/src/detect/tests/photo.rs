@@ -104,7 +104,7 @@ impl Photo {
 
     pub fn save(&self, path: &Path) {
         let image = self.take();
-        let bytes: Vec<u8> = image.values.iter().map(|&v| v as u8).collect();
+        let bytes: Vec<u8> = image.values().map(|v| v as u8).collect();
         image::GrayImage::from_raw(self.sensor.width, self.sensor.height, bytes)
             .unwrap()
             .save(path)
@@ -154,7 +154,7 @@ impl Photo {
     }
 }
 
-fn blur(values: &mut [f64], width: usize, sigma_px: f64) {
+pub fn blur(values: &mut [f64], width: usize, sigma_px: f64) {
     if sigma_px <= 0.0 {
         return;
     }

@@ -32,7 +32,7 @@ fn frontals(blur_px: f64) -> Vec<Exact> {
     ]
 }
 
-fn across(blur_px: f64) -> Vec<Exact> {
+pub fn across(blur_px: f64) -> Vec<Exact> {
     [
         (2.0, [0.0, 0.0]),
         (8.0, [20.0, -10.0]),

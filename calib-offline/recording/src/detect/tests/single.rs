@@ -153,7 +153,7 @@ fn images_without_a_board_say_why() {
     photo.noise = 25.0;
     assert!(matches!(
         refusal(photo.board.clone(), photo.clone()),
-        Refusal::NoBoard
+        Refusal::NoBoard { kind: "chessboard" }
     ));
     photo = tilted(board(6, 9), 0.0, [10.0, -20.0], 0.0, 0.0);
     photo.blur_px = 14.0;
