@@ -21,7 +21,7 @@ pub use offered::{Offered, camera_names, explained, offered};
 pub use verify::{Verified, verify};
 pub use verify_error::VerifyError;
 
-use crate::methods::{Given, Joint, Method, Own, fit_folds};
+use crate::methods::{Given, Joint, Method, Own, Solution, fit_folds};
 use crate::report::Calibration;
 use calib_estimate::adjust::Observations;
 use calib_judge::agreement::{Whole, agreement};
@@ -178,6 +178,8 @@ pub fn calibrate_corners(
         .fit(&given, progress)
         .map_err(|error| explained(error, dataset, &views))?;
 
+    offered::check_known_fits(dataset, &views, solution.sigma_px)?;
+
     // Before all that takes long: it may be that it cannot be answered.
     let task = settings.task.map(|task| {
         let declared = declared(dataset, settings);
@@ -185,29 +187,33 @@ pub fn calibrate_corners(
     });
     let task = task.transpose()?;
 
-    let used = &solution.observations;
-    let folds = folds_wanted(used, settings.folds);
-    let halves = first_halves(used, |pose| given.placements.get(&pose).copied());
-    let halves: &[_] = if settings.folds > 0 { &halves } else { &[] };
-    progress.begin("cross-checks", folds);
-    let (folds, (checks, causes)) = rayon::join(
-        || {
-            fit_folds(
-                settings.method,
-                &given,
-                used,
-                folds,
-                Some(&*solution.own),
-                progress,
-            )
-        },
-        || {
-            rayon::join(
-                || solution.own.check(&solution.rig, halves),
-                || solution.own.suspects(&solution.rig),
-            )
-        },
-    );
+    let wanted = folds_wanted(&solution.observations, settings.folds);
+    progress.begin("cross-checks", wanted);
+    let fit_folds = |solution: &Solution| {
+        let used = &solution.observations;
+        let own = Some(&*solution.own);
+        fit_folds(settings.method, &given, used, wanted, own, progress)
+    };
+    let check = |solution: &Solution| {
+        let halves = first_halves(&solution.observations, |pose| {
+            given.placements.get(&pose).copied()
+        });
+        let halves: &[_] = if settings.folds > 0 { &halves } else { &[] };
+        rayon::join(
+            || solution.own.check(&solution.rig, halves),
+            || solution.own.suspects(&solution.rig),
+        )
+    };
+    let (solution, folds, (checks, causes)) = if solution.own.may_be_simpler() && wanted > 0 {
+        let mut folds = fit_folds(&solution);
+        let names = camera_names(dataset);
+        let solution = solution.held_against(&mut folds, &names)?;
+        let checked = check(&solution);
+        (solution, folds, checked)
+    } else {
+        let (folds, checked) = rayon::join(|| fit_folds(&solution), || check(&solution));
+        (solution, folds, checked)
+    };
     progress.end();
     let sheet = Sheet::of(dataset, &views);
     let mut causes = sheet.with_suspects(causes);
@@ -222,7 +228,7 @@ pub fn calibrate_corners(
     let misread = units_of_places(dataset, &solution.rig, distance_mm, mm_per_px);
     causes.splice(0..0, misread);
     let central = checks.as_ref().map(|checks| &checks.central_model);
-    causes.extend(central.and_then(|c| unexpected_optics(dataset, &solution.rig, c)));
+    causes.extend(central.and_then(|c| unexpected_optics(dataset, c)));
     let whole = Whole {
         rig: &solution.rig,
         board_shape: &solution.board_shape,

@@ -6,6 +6,10 @@ use calib_rays::field::Rig;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Twice the log evidence that says something against what a camera is declared to be: "very strong" (Kass and Raftery
+/// 1995), as for every fault.
+const DECLARED_GAIN: f64 = 10.0;
+
 /// The cost of a central model.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -26,26 +30,50 @@ pub enum CentralModel {
     },
     /// Without offsets there is no estimate.
     NoEstimate,
+    /// Cameras are declared to be central, and the data would have offsets for them.
+    Declared {
+        /// Twice the log evidence that a model with offsets for all cameras would gain, above 10.
+        offsets_gain: f64,
+        /// How far points of the volume with boards would move, a rigid motion apart; `None` for one camera.
+        points: Option<PointDifference>,
+    },
 }
 
 /// Estimates without offsets, and compares.
 ///
 /// Cost: a few rounds of the estimate; none for a central rig.
 pub fn central_model(estimate: &Estimate, rig: &Rig, matches: &[Match]) -> CentralModel {
+    let names = || {
+        rig.cameras
+            .iter()
+            .map(|c| c.name.clone())
+            .collect::<Vec<_>>()
+    };
+    let moved = |other: &Estimate| {
+        let compared = compare(rig, &other.rig(&names()), matches);
+        compared.map(|compared| compared.difference)
+    };
+    let forbidden = estimate.forbidden.as_ref();
+    if let Some(forbidden) = forbidden.filter(|forbidden| forbidden.gain > DECLARED_GAIN) {
+        return CentralModel::Declared {
+            offsets_gain: forbidden.gain,
+            points: estimate.made_non_central().as_ref().and_then(moved),
+        };
+    }
     if rig.cameras.iter().all(|camera| camera.field.is_central()) {
         return CentralModel::IsCentral {
-            offsets_gain: offsets_gain(&estimate.choices),
+            offsets_gain: forbidden
+                .map(|forbidden| forbidden.gain)
+                .or_else(|| offsets_gain(&estimate.choices)),
         };
     }
     let central = estimate.made_central().ok();
     let Some(central) = central.filter(|central| central.evidence_loss.is_finite()) else {
         return CentralModel::NoEstimate;
     };
-    let names: Vec<String> = rig.cameras.iter().map(|c| c.name.clone()).collect();
-    let central_rig = central.estimate.rig(&names);
     CentralModel::Costs {
         evidence_loss: central.evidence_loss,
-        points: compare(rig, &central_rig, matches).map(|compared| compared.difference),
+        points: moved(&central.estimate),
     }
 }
 

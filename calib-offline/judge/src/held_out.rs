@@ -8,6 +8,7 @@ use super::measured_board::MeasuredBoard;
 use calib_estimate::adjust::Observations;
 use calib_estimate::adjust::observations::ViewBlock;
 use calib_estimate::init::board_pose::residuals_with_free_pose;
+use calib_estimate::joint::Estimate;
 use calib_rays::board::BoardShape;
 use calib_rays::field::Rig;
 use calib_rays::geometry::PixelPoint;
@@ -27,6 +28,8 @@ pub struct Estimated {
     pub rig: Rig,
     /// Out-of-plane shape of the board.
     pub board_shape: BoardShape,
+    /// The joint estimate behind it, if it is one: its model may then be compared with simpler ones.
+    pub joint: Option<Box<Estimate>>,
 }
 
 /// An estimate from all poses (or points) but those of one fold.
@@ -36,6 +39,8 @@ pub struct Fold {
     pub rig: Rig,
     /// The board's shape that they gave.
     pub board_shape: BoardShape,
+    /// The joint estimate behind it, if it is one.
+    pub joint: Option<Box<Estimate>>,
     /// What was left out.
     pub unseen: Observations,
 }
@@ -186,9 +191,14 @@ pub fn estimate_folds<E: Display>(
             let result = estimate(&dealt.part(observations, folds, |of| of != fold));
             progress.advance();
             match result {
-                Ok(Estimated { rig, board_shape }) => Ok(Fold {
+                Ok(Estimated {
                     rig,
                     board_shape,
+                    joint,
+                }) => Ok(Fold {
+                    rig,
+                    board_shape,
+                    joint,
                     unseen: dealt.part(observations, folds, |of| of == fold),
                 }),
                 Err(error) => Err(FailedFold {

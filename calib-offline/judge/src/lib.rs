@@ -14,6 +14,7 @@ pub mod held_out;
 pub mod known_points;
 pub mod lengths;
 pub mod measured_board;
+pub mod model_choice;
 pub mod neighbor_noise;
 pub mod plausibility;
 pub mod screened;

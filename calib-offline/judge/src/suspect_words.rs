@@ -3,6 +3,7 @@
 use super::cause::Code;
 use calib_estimate::explain::{Explanation, Suspect};
 use calib_estimate::joint::Estimate;
+use calib_rays::board::{BoardSpec, Layout};
 use nalgebra::Vector3;
 
 /// What is told of an explanation.
@@ -37,7 +38,7 @@ pub(crate) fn told(found: &Explanation, estimate: &Estimate, names: &[String]) -
             .to_degrees()
     };
     match found.suspect {
-        Suspect::BoardScale | Suspect::BoardShear => squares(found),
+        Suspect::BoardScale | Suspect::BoardShear => squares(found, &estimate.observations.board),
         Suspect::BoardFlexes => flexes(found),
         Suspect::Shift { camera_idx } => {
             let code = match found.half_pixels() {
@@ -110,7 +111,7 @@ pub(crate) fn told(found: &Explanation, estimate: &Estimate, names: &[String]) -
     }
 }
 
-fn squares(found: &Explanation) -> Told {
+fn squares(found: &Explanation, board: &BoardSpec) -> Told {
     let at = |k: usize| found.values.get(k).copied().unwrap_or(0.0);
     let sd_percent = 100.0 * found.sd.first().copied().unwrap_or(0.0);
     let longer = if at(0) > 0.0 { "row" } else { "column" };
@@ -125,11 +126,28 @@ fn squares(found: &Explanation) -> Told {
     Told {
         code: Code::SquareScaleAxis,
         size: format!(
-            "squares {:.3} +- {sd_percent:.3} % longer along a {longer}{shear}",
-            100.0 * at(0).abs()
+            "squares {:.3} +- {sd_percent:.3} % longer along a {longer}{shear}{}",
+            100.0 * at(0).abs(),
+            line_to_write(board, at(0))
         ),
-        what: "the board's squares are not square".to_owned(),
+        what: match board.layout {
+            Layout::Rectangles(_) => "the board's squares are not as high as described".to_owned(),
+            _ => "the board's squares are not square".to_owned(),
+        },
     }
+}
+
+/// What the description would be of a chessboard whose squares are longer by this share along a row than stated,
+/// against along a column: which of the two is off the images do not tell, so the one along a row is kept.
+fn line_to_write(board: &BoardSpec, longer: f64) -> String {
+    if !matches!(board.layout, Layout::Grid | Layout::Rectangles(_)) {
+        return String::new();
+    }
+    let [width_mm, height_mm] = board.square_sides_mm();
+    format!(
+        " (if square_mm = {width_mm} is right along a row, write square_height_mm = {:.4})",
+        height_mm / (1.0 + longer)
+    )
 }
 
 fn flexes(found: &Explanation) -> Told {
@@ -145,7 +163,7 @@ fn flexes(found: &Explanation) -> Told {
 pub(crate) fn advice(code: Code) -> &'static str {
     match code {
         Code::SquareScaleAxis => {
-            "measure the board along both directions, and print or mount it anew"
+            "measure the board along both directions, and write both (square_mm along a row, square_height_mm along a column), or print it anew"
         }
         Code::BoardFlexes => "use a stiffer board, or hold it without force",
         Code::PixelOrigin => "take all corners with one tool and one convention",
@@ -155,5 +173,22 @@ pub(crate) fn advice(code: Code) -> &'static str {
         Code::NotSimultaneous => "trigger the cameras together, or hold the board still",
         Code::RollingShutter => "hold the board still, or use a global shutter",
         _ => "look at the recording",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_to_write_makes_the_squares_as_high_as_they_were_found() {
+        let board = BoardSpec::chessboard(6, 9, 20.0);
+        // Squares that are 0.5 % longer along a row are lower by as much.
+        let line = line_to_write(&board, 0.005);
+        assert!(line.contains("square_height_mm = 19.9005"), "{line}");
+        let corrected = BoardSpec::rectangles(6, 9, 20.0, 19.9);
+        let line = line_to_write(&corrected, -0.001);
+        assert!(line.contains("square_height_mm = 19.9199"), "{line}");
+        assert_eq!(line_to_write(&BoardSpec::points(Vec::new()), 0.005), "");
     }
 }

@@ -3,39 +3,36 @@
 use super::cause::{Cause, Code};
 use super::central_model::CentralModel;
 use super::grade::Grade;
-use calib_rays::field::Rig;
 use calib_recording::dataset::{Dataset, ExpectedOptics};
 
-/// A reason of its own where the data want offsets for cameras whose `optics` is `plain`; `None` where
-/// nothing was declared, or no ray asks for it.
-pub fn unexpected_optics(dataset: &Dataset, rig: &Rig, central: &CentralModel) -> Option<Cause> {
-    let CentralModel::Costs {
+/// A reason of its own where the data want offsets for cameras whose `optics` is `plain`, which have none for that;
+/// `None` where nothing was declared, or no ray asks for it.
+pub fn unexpected_optics(dataset: &Dataset, central: &CentralModel) -> Option<Cause> {
+    let CentralModel::Declared {
         points,
-        evidence_loss,
+        offsets_gain,
     } = central
     else {
         return None;
     };
-    let cameras = dataset.cameras.iter().zip(&rig.cameras);
-    let names: Vec<&str> = cameras
-        .filter(|(declared, found)| {
-            declared.optics == Some(ExpectedOptics::Plain) && !found.field.is_central()
-        })
-        .map(|(declared, _)| declared.name.as_str())
+    let declared = dataset.cameras.iter();
+    let names: Vec<&str> = declared
+        .filter(|camera| camera.optics == Some(ExpectedOptics::Plain))
+        .map(|camera| camera.name.as_str())
         .collect();
-    if names.is_empty() {
-        return None;
-    }
     let cost_mm = points.map_or(0.0, |points| points.rms_mm);
+    let moved = points.map_or(String::new(), |_| {
+        format!(" and move measured points by {cost_mm:.3} mm RMS")
+    });
     Some(Cause {
         code: Code::NonCentralUnexpected,
         since_pose: None,
-        size: format!("a central model would lose {evidence_loss:.0} of evidence"),
+        size: format!("rays that need not meet would gain {offsets_gain:.0} of evidence"),
         cost_mm,
         text: format!(
-            "the rays of camera {} do not meet in a point although its optics is \"plain\"; it moves \
-             measured points by {cost_mm:.3} mm RMS; look for a fault of the board or of the recording, or \
-             declare what stands before the lens (optics = \"window\")",
+            "the optics of camera {} is \"plain\", so its rays meet in a point; rays that need not would gain \
+             {offsets_gain:.0} of evidence{moved}; look for a fault of the board or of the recording, or declare \
+             what stands before the lens (optics = \"window\")",
             names.join(" and ")
         ),
         grade: Grade::Doubtful,

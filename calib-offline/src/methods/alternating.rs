@@ -82,6 +82,7 @@ impl Method for Alternating {
         let names = training.numbered_cameras();
         let (_, fields) = estimate_rig(&start, &names, given.placements)?;
         Ok(Estimated {
+            joint: None,
             rig: fields.rig,
             board_shape: BoardShape::default(),
         })

@@ -66,6 +66,7 @@ impl Method for Pinhole {
         let pinhole = calibrate_rig(training, &settings())?;
         let found = pinhole.rig(&training.numbered_cameras(), training)?;
         Ok(Estimated {
+            joint: None,
             rig: found.rig,
             board_shape: BoardShape::default(),
         })

@@ -5,10 +5,12 @@ use crate::report::record::{AlternatingRecord, ChoicesRecord};
 use calib_estimate::adjust::robust::{StudentT, relative_weights, reweight};
 use calib_estimate::adjust::{Observations, StopReason};
 use calib_estimate::init::screening::Finding;
+use calib_estimate::joint::Simpler;
 use calib_judge::half_data::{FirstHalf, Split};
 use calib_judge::held_out::Estimated;
 use calib_judge::known_points::{Points, measure};
-use calib_judge::{Cause, CrossChecks, Declared, ExpectedError, Task, TaskError};
+use calib_judge::model_choice::ModelChoice;
+use calib_judge::{Cause, CrossChecks, Declared, ExpectedError, Folds, Task, TaskError};
 use calib_rays::board::BoardShape;
 use calib_rays::field::{RayTable, Rig};
 use calib_rays::geometry::{RigidTransform, SensorSize};
@@ -81,6 +83,27 @@ pub trait Own: Debug + Send + Sync {
         None
     }
 
+    /// Whether it has anything to do without that boards it never saw could speak against.
+    fn may_be_simpler(&self) -> bool {
+        false
+    }
+
+    /// What the boards that each fold never saw say to its choice of a model. Where a simpler one is taken, the folds are
+    /// made what that makes of them.
+    fn judged_by(&self, _folds: &mut Folds) -> Option<ModelChoice> {
+        None
+    }
+
+    /// The solution by a simpler model; `None` if it has no other.
+    fn made_simpler(
+        &self,
+        _to: Simpler,
+        _findings: &[Finding],
+        _names: &[String],
+    ) -> Option<Result<Solution, MethodError>> {
+        None
+    }
+
     /// Numbers that the data determine, poses apart; 0 if that is not known.
     fn freedom(&self) -> f64 {
         0.0
@@ -112,6 +135,22 @@ pub trait Own: Debug + Send + Sync {
 }
 
 impl Solution {
+    /// Holds the choice of the model against boards that no fold learned from, and takes what they speak for.
+    ///
+    /// # Errors
+    /// What an estimate by the simpler model says.
+    pub fn held_against(self, folds: &mut Folds, names: &[String]) -> Result<Self, MethodError> {
+        let found = self.own.judged_by(folds);
+        let taken = found.iter().flat_map(|found| &found.compared);
+        let taken = taken.filter(|one| one.taken).map(|one| one.without).next();
+        let simpler = taken.and_then(|to| self.own.made_simpler(to, &self.findings, names));
+        let mut solution = simpler.unwrap_or(Ok(self))?;
+        if let Some(choices) = &mut solution.choices {
+            choices.unseen = found;
+        }
+        Ok(solution)
+    }
+
     /// Points of matches by the method's own rays, rig frame, mm.
     pub fn measure(&self, matches: &[Vec<Sighting<f64>>]) -> Points {
         if let Some(rays) = self.own.rays() {

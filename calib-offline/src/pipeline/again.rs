@@ -1,11 +1,12 @@
 //! The estimate behind a calibration, made again from the corners that the file holds: with it comes all that
 //! it leaves open, and not only what the file says of that.
 
+use super::offered::declared_central;
 use crate::methods::MethodError;
 use crate::report::Calibration;
 use calib_estimate::adjust::Observations;
 use calib_estimate::init::rig::start_rig;
-use calib_estimate::joint::{Estimate, estimate_screened};
+use calib_estimate::joint::{Estimate, Simpler, estimate_screened};
 use calib_rays::field::Rig;
 use calib_rays::observed::{Corner, View};
 use std::collections::BTreeMap;
@@ -22,11 +23,25 @@ pub fn estimate_again(calibration: &Calibration) -> Option<Result<Estimate, Meth
     let sensors = cameras.map(|camera| camera.field.sensor).collect();
     let views = views(calibration);
     let observations = Observations::new(calibration.board.clone(), sensors, &views)
-        .with_known_poses(calibration.known_poses.clone());
+        .with_known_poses(calibration.known_poses.clone())
+        .with_declared_central(declared_central(
+            calibration.cameras.iter().map(|camera| camera.optics),
+        ));
     let found = start_rig(&observations)
         .map_err(MethodError::from)
-        .and_then(|start| Ok(estimate_screened(&observations, start)?.0));
+        .and_then(|start| Ok(estimate_screened(&observations, start)?.0))
+        .and_then(|estimate| match taken(calibration) {
+            Some(simpler) => Ok(estimate.made_simpler(simpler)?),
+            None => Ok(estimate),
+        });
     Some(found)
+}
+
+/// The simpler model that unseen boards spoke for.
+fn taken(calibration: &Calibration) -> Option<Simpler> {
+    let unseen = calibration.choices.as_ref()?.unseen.as_ref()?;
+    let mut taken = unseen.compared.iter().filter(|one| one.taken);
+    taken.next().map(|one| one.without)
 }
 
 /// Names of a rig's cameras.

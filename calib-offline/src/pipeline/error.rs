@@ -1,10 +1,12 @@
 //! Why a dataset gives no calibration.
 
 use crate::methods::MethodError;
+use calib_judge::plausibility::Misread;
 use calib_judge::{Cause, TaskError};
 use calib_rays::remedy::Remedy;
 use calib_recording::dataset::{CornersError, SufficiencyError};
 use calib_recording::detect::DetectError;
+use std::path::PathBuf;
 
 /// Why a dataset gives no calibration.
 #[derive(Debug, thiserror::Error)]
@@ -47,6 +49,16 @@ pub enum CalibrateError {
         /// The failure that it explains.
         source: MethodError,
     },
+    /// Known places or poses that contradict what was seen, and how they fit.
+    #[error("{}: {known}", file.display())]
+    Misread {
+        /// The file that they stand in.
+        file: PathBuf,
+        /// What is wrong with them.
+        known: Misread,
+        /// The failure that it explains, if there was no answer at all.
+        source: Option<MethodError>,
+    },
     /// No answer.
     #[error(transparent)]
     Method(#[from] MethodError),
@@ -66,9 +78,11 @@ pub struct NoSuchPose {
 }
 
 /// Poses that are known beforehand, and none of them seen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("no pose that [poses] known lists has corners; the first listed is pose {first}")]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{}: no pose that [poses] known lists has corners; the first listed is pose {first}", file.display())]
 pub struct NoKnownPose {
+    /// The file that lists them.
+    pub file: PathBuf,
     /// The first pose listed.
     pub first: usize,
 }
@@ -80,12 +94,15 @@ impl CalibrateError {
             Self::Corners(_) | Self::Exclude(_) | Self::Known(_) => false,
             Self::Detect(error) => matches!(
                 error,
-                DetectError::Consistency(_) | DetectError::WrongCount { .. }
+                DetectError::Consistency(_)
+                    | DetectError::WrongCount { .. }
+                    | DetectError::WrongTarget { .. }
             ),
             Self::Task(error) => error.is_undetermined(),
             Self::Sufficiency(_)
             | Self::FewImages { .. }
             | Self::Implausible { .. }
+            | Self::Misread { .. }
             | Self::Method(_) => true,
         }
     }
@@ -109,6 +126,7 @@ impl Remedy for CalibrateError {
             Self::Implausible { .. } => Some(
                 "correct that first; calib-offline inspect DATASET says what else is to be seen".to_owned(),
             ),
+            Self::Misread { known, .. } => known.remedy(),
             Self::Method(error) => error.remedy(),
             Self::Task(error) => error.remedy(),
         }

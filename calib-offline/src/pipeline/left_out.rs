@@ -5,6 +5,7 @@ use crate::methods::solution::{Unused, unused};
 use crate::report::record::{LeftOut, Renumbered};
 use calib_estimate::init::screening::{Finding, FindingKind};
 use calib_judge::plausibility::Explained;
+use calib_recording::capture::known_without_corners;
 use calib_recording::detect::verdict::Outcome;
 
 /// Poses, views and corners that did not go in.
@@ -23,6 +24,14 @@ pub fn left_out(parts: &Parts, names: &[String]) -> Vec<LeftOut> {
             camera: None,
             corner_count,
             reason: "excluded by the user".to_string(),
+        });
+    }
+    for pose in known_without_corners(parts.dataset, &parts.corners.views) {
+        list.push(LeftOut {
+            pose,
+            camera: None,
+            corner_count: 0,
+            reason: "its place is known, but no camera has corners of it".to_string(),
         });
     }
     let solution = parts.solution;

@@ -4,12 +4,13 @@ use super::corners::Corners;
 use super::error::{CalibrateError, NoKnownPose, NoSuchPose};
 use crate::methods::MethodError;
 use calib_estimate::adjust::Observations;
-use calib_judge::plausibility::Sheet;
+use calib_judge::plausibility::{FITS_PER_WIDTH, Sheet, misread};
 use calib_judge::verdict::Grade;
+use calib_judge::{Cause, Code};
 use calib_rays::observed::View;
-use calib_recording::dataset::Dataset;
 use calib_recording::dataset::split::without_excluded;
 use calib_recording::dataset::sufficiency::{SufficiencyError, check_sufficiency};
+use calib_recording::dataset::{Dataset, ExpectedOptics};
 use calib_recording::detect;
 use calib_recording::detect::verdict::Outcome;
 
@@ -36,21 +37,68 @@ pub fn offered(dataset: &Dataset, corners: &Corners) -> Result<Offered, Calibrat
     Ok(Offered {
         observations: Observations::new(dataset.board.clone(), sensors, &views)
             .with_flatness(dataset.certificate.and_then(|c| c.flatness_mm_sd))
-            .with_known_poses(dataset.known_poses.clone()),
+            .with_known_poses(dataset.known_poses.clone())
+            .with_declared_central(declared_central(
+                dataset.cameras.iter().map(|camera| camera.optics),
+            )),
         views,
     })
 }
 
+/// Cameras that look through nothing and into nothing, by what is declared of each.
+pub(super) fn declared_central(
+    declared: impl Iterator<Item = Option<ExpectedOptics>>,
+) -> Vec<bool> {
+    declared
+        .map(|optics| optics == Some(ExpectedOptics::Plain))
+        .collect()
+}
+
 /// Why no method had an answer: what is wrong with the recording on its face, if anything is.
 pub fn explained(error: MethodError, dataset: &Dataset, used: &[View]) -> CalibrateError {
+    if let Some(known) = misread(dataset, used) {
+        return CalibrateError::Misread {
+            file: known.file(dataset),
+            known,
+            source: Some(error),
+        };
+    }
     let causes = Sheet::of(dataset, used).causes;
-    match causes.first().filter(|cause| cause.grade > Grade::Pass) {
+    // What was not seen explains no failure.
+    let explains = |cause: &&Cause| cause.grade > Grade::Pass && cause.code != Code::Coverage;
+    match causes.iter().find(explains) {
         Some(first) => CalibrateError::Implausible {
             first: Box::new(first.clone()),
             causes,
             source: error,
         },
         None => error.into(),
+    }
+}
+
+/// Refuses an answer that leaves so much of every corner that what was known beforehand must be wrong, and says how
+/// it would fit.
+///
+/// # Errors
+/// [`CalibrateError::Misread`].
+pub fn check_known_fits(
+    dataset: &Dataset,
+    views: &[View],
+    sigma_px: f64,
+) -> Result<(), CalibrateError> {
+    let widths = dataset.cameras.iter().map(|camera| camera.sensor.width);
+    let narrowest_px = widths.min().map_or(0.0, f64::from);
+    let is_grid = dataset.board.layout.is_grid() && dataset.known_poses.is_empty();
+    if is_grid || sigma_px <= FITS_PER_WIDTH * narrowest_px {
+        return Ok(());
+    }
+    match misread(dataset, views) {
+        Some(known) => Err(CalibrateError::Misread {
+            file: known.file(dataset),
+            known,
+            source: None,
+        }),
+        None => Ok(()),
     }
 }
 
@@ -79,7 +127,8 @@ fn check_known(dataset: &Dataset, views: &[View]) -> Result<(), NoKnownPose> {
     if views.iter().any(|view| known.contains_key(&view.pose)) {
         return Ok(());
     }
-    Err(NoKnownPose { first })
+    let file = dataset.known_poses_file.clone().unwrap_or_default();
+    Err(NoKnownPose { file, first })
 }
 
 /// Too few corners, with the reason for which images were refused.

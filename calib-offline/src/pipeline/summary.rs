@@ -59,6 +59,7 @@ pub fn record(parts: &Parts) -> Calibration {
         checks: parts.checks.cloned(),
         causes: parts.causes.to_vec(),
         task: parts.task.cloned(),
+        imported: None,
         verdict,
         nearest_pinholes: Vec::new(),
     };

@@ -36,6 +36,9 @@ pub fn verify(
     corners: &Corners,
     progress: &dyn Progress,
 ) -> Result<Verified, VerifyError> {
+    if calibration.imported.is_some() {
+        return Err(VerifyError::Imported);
+    }
     let cameras = cameras(calibration, dataset)?;
     let sensors: Vec<_> = calibration
         .rig

@@ -8,6 +8,11 @@ use calib_rays::remedy::Remedy;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VerifyError {
+    /// A calibration that came from another tool.
+    #[error(
+        "the calibration was imported: it holds no corners, and what it leaves open is not known"
+    )]
+    Imported,
     /// A calibration without the corners that it was made from.
     #[error("the calibration holds no corners: what it leaves open is not known")]
     NoOldCorners,
@@ -62,6 +67,9 @@ fn words(board: &BoardSpec) -> String {
     let (rows, cols, square_mm) = (board.rows, board.cols, board.square_mm);
     match board.layout {
         Layout::Points(_) => format!("{cols} points"),
+        Layout::Rectangles(height_mm) => {
+            format!("{rows} x {cols} corners and squares of {square_mm} x {height_mm} mm")
+        }
         Layout::Grid | Layout::Face(_) => {
             format!("{rows} x {cols} corners and {square_mm} mm squares")
         }
@@ -78,6 +86,7 @@ impl VerifyError {
 impl Remedy for VerifyError {
     fn remedy(&self) -> Option<String> {
         let text = match self {
+            Self::Imported => "judge it on the new poses with calib-offline audit",
             Self::NoOldCorners => {
                 "verify with a calibration.json that calib-offline calibrate wrote"
             }

@@ -29,6 +29,9 @@ pub struct Observations {
     pub board_shape_sd_mm: f64,
     /// Poses that are known beforehand, by number.
     pub known_poses: BTreeMap<usize, KnownPose>,
+    /// Per camera: whether its rays are declared to meet in one point, whatever the data ask for; empty where
+    /// nothing is declared.
+    pub declared_central: Vec<bool>,
     /// Sensor per camera.
     pub sensors: Vec<SensorSize>,
     /// Numbers of the poses, rising; a pose's index here is its index everywhere in `adjust`.
@@ -118,6 +121,7 @@ impl Observations {
             board,
             board_shape_sd_mm: BOARD_SHAPE_SD_MM,
             known_poses: BTreeMap::new(),
+            declared_central: Vec::new(),
             sensors,
             poses,
             views: blocks,
@@ -150,6 +154,21 @@ impl Observations {
             self.board_shape_sd_mm = sd_mm.max(FLATTEST_MM);
         }
         self
+    }
+
+    /// The same of cameras of which some are declared to be central.
+    #[must_use]
+    pub fn with_declared_central(mut self, declared: Vec<bool>) -> Self {
+        self.declared_central = declared;
+        self
+    }
+
+    /// Whether a camera is declared to be central.
+    pub fn is_declared_central(&self, camera_idx: usize) -> bool {
+        self.declared_central
+            .get(camera_idx)
+            .copied()
+            .unwrap_or(false)
     }
 
     /// The same of poses of which some are known beforehand, by number.
@@ -280,6 +299,7 @@ impl Observations {
             board: self.board.clone(),
             board_shape_sd_mm: self.board_shape_sd_mm,
             known_poses: self.known_poses.clone(),
+            declared_central: self.declared_central.clone(),
             sensors: self.sensors.clone(),
             poses: kept.iter().map(|idx| self.poses[*idx]).collect(),
             views,
@@ -313,6 +333,7 @@ impl Observations {
             view.camera_idx = 0;
         }
         selected.sensors = vec![self.sensors[camera_idx]];
+        selected.declared_central = vec![self.is_declared_central(camera_idx)];
         selected
     }
 }

@@ -138,6 +138,7 @@ fn example(has_spline: [bool; 2]) -> (Model, Observations) {
         board: BOARD,
         board_shape_sd_mm: BOARD_SHAPE_SD_MM,
         known_poses: [].into(),
+        declared_central: Vec::new(),
         sensors: vec![SENSOR; 2],
         poses: (0..model.rig_from_board.len()).collect(),
         views,

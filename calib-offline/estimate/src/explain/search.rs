@@ -106,10 +106,10 @@ impl Explained {
         let model = &self.candidate.fit.model;
         let others = [
             if is_plain(model) { None } else { self.plain() },
-            if has_offsets(model) {
+            if has_offsets(model) || !choice::may_have_offsets(&self.observations) {
                 None
             } else {
-                self.changed(choice::add_offsets)
+                self.changed(|model| choice::add_offsets(model, &self.observations))
             },
         ];
         std::iter::once(self)
@@ -122,7 +122,8 @@ impl Explained {
         let Some(plain) = self.plain() else {
             return vec![self];
         };
-        let (candidate, _) = choice::choose(plain.candidate.clone(), None, &self.observations);
+        let chosen = choice::choose(plain.candidate.clone(), None, &self.observations);
+        let candidate = chosen.best;
         let best = if candidate.evidence > self.candidate.evidence {
             Self {
                 candidate,

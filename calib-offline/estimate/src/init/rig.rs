@@ -2,57 +2,14 @@
 
 use super::InitError;
 use super::focal_scan::start_camera;
+use super::known_rig;
 use super::pair_consensus::COARSE_LIMIT_SIGMA;
-use super::screening::{Finding, screen};
+pub use super::rig_start::RigStart;
+use super::screening::screen;
 use crate::adjust::Observations;
 use calib_rays::board::BoardShape;
 use calib_rays::field::RayField;
-use calib_rays::geometry::RigidTransform;
 use calib_rays::in_order;
-
-/// A starting point for the estimate of everything. The rig frame is that of camera 0, or of known poses.
-#[derive(Debug, Clone)]
-pub struct RigStart {
-    /// What can be adjusted together: the views offered, screened.
-    pub observations: Observations,
-    /// What the screening did.
-    pub findings: Vec<Finding>,
-    /// Cubic field per camera.
-    pub fields: Vec<RayField>,
-    /// Per camera; the identity for camera 0, unless poses are known.
-    pub camera_from_rig: Vec<RigidTransform>,
-    /// Per pose index of the observations; `None` where no camera could place the board.
-    pub rig_from_board: Vec<Option<RigidTransform>>,
-    /// Median length of the residual vectors per camera, px, each camera by itself.
-    pub median_px: Vec<f64>,
-}
-
-/// The same where poses are known beforehand: from all of these as one target; then every pose by itself, those
-/// known where they are known to be. The rig's frame is theirs, and views of known poses are not screened.
-fn start_known(observations: &Observations) -> Result<RigStart, InitError> {
-    let mut start = start_free(&observations.with_known_as_one())?;
-    let of_number = |pose: usize| start.observations.poses.binary_search(&pose).ok();
-    let first = observations.known_poses.keys().next().copied();
-    let first_from_known = first
-        .and_then(of_number)
-        .and_then(|idx| start.rig_from_board[idx])
-        .unwrap_or_else(RigidTransform::identity);
-    let known_from_first = first_from_known.inverse();
-    start.rig_from_board = observations
-        .poses
-        .iter()
-        .map(|pose| match observations.known_poses.get(pose) {
-            Some(known) => Some(known.rig_from_board),
-            None => Some(known_from_first * start.rig_from_board[of_number(*pose)?]?),
-        })
-        .collect();
-    for camera_from_rig in &mut start.camera_from_rig {
-        *camera_from_rig = *camera_from_rig * first_from_known;
-    }
-    start.findings.clear();
-    start.observations = observations.clone();
-    Ok(start)
-}
 
 /// Starts every camera by itself, then joins them over their common poses; views that cannot be
 /// what they claim are found on the way ([`screen`]).
@@ -63,7 +20,7 @@ pub fn start_rig(observations: &Observations) -> Result<RigStart, InitError> {
     if observations.known_poses.is_empty() {
         start_free(observations)
     } else {
-        start_known(observations)
+        known_rig::start(observations)
     }
 }
 

@@ -124,6 +124,25 @@ pub fn screen(
     Ok(work.finish())
 }
 
+/// Whether the middle pair of two cameras' views agrees with one place of the second.
+pub(super) fn check_agreed(
+    found: &Consensus,
+    observations: &Observations,
+    [reference_idx, camera_idx]: [usize; 2],
+    pairs: usize,
+) -> Result<(), InitError> {
+    let width_px = f64::from(observations.sensors[camera_idx].width);
+    if found.typical_px <= MOST_PAIR_MISFIT_PER_WIDTH * width_px {
+        return Ok(());
+    }
+    Err(InitError::CamerasDisagree {
+        camera_idx,
+        reference_idx,
+        misfit_px: found.typical_px,
+        pairs,
+    })
+}
+
 /// Views far worse than the others of their camera lose their corners.
 fn leave_out_misfits(
     observations: &Observations,
@@ -250,15 +269,12 @@ impl Screening<'_> {
             .collect();
         let found = consensus(&self.observations.board, &pairs, self.limit_sigma)
             .ok_or(InitError::NoCommonPose { camera_idx })?;
-        let width_px = f64::from(self.observations.sensors[camera_idx].width);
-        if !(found.typical_px <= MOST_PAIR_MISFIT_PER_WIDTH * width_px) {
-            return Err(InitError::CamerasDisagree {
-                camera_idx,
-                reference_idx: reference,
-                misfit_px: found.typical_px,
-                pairs: links.len(),
-            });
-        }
+        check_agreed(
+            &found,
+            self.observations,
+            [reference, camera_idx],
+            links.len(),
+        )?;
         let rig_from_reference =
             self.camera_from_rig[reference].map_or_else(RigidTransform::identity, |t| t.inverse());
         self.camera_from_rig[camera_idx] =
@@ -380,6 +396,7 @@ impl Screening<'_> {
             board: old.board.clone(),
             board_shape_sd_mm: old.board_shape_sd_mm,
             known_poses: old.known_poses.clone(),
+            declared_central: old.declared_central.clone(),
             sensors: old.sensors.clone(),
             poses: Vec::new(),
             views: Vec::new(),

@@ -144,13 +144,19 @@ impl Candidate {
     }
 }
 
+/// What was chosen.
+pub struct Chosen {
+    /// The best model.
+    pub best: Candidate,
+    /// The way to it.
+    pub tried: Vec<Choice>,
+    /// The same with offsets for every camera, where some may have none.
+    pub forbidden: Option<Candidate>,
+}
+
 /// Takes what the evidence asks for, starting from a settled fit without spline and offset. `ideal` is the fit before
 /// its lenses were fitted anew, if that is to be gone back to.
-pub fn choose(
-    start: Candidate,
-    ideal: Option<&Fit>,
-    observations: &Observations,
-) -> (Candidate, Vec<Choice>) {
+pub fn choose(start: Candidate, ideal: Option<&Fit>, observations: &Observations) -> Chosen {
     let mut search = Search {
         best: start,
         tried: Vec::new(),
@@ -165,8 +171,13 @@ pub fn choose(
             break;
         }
     }
+    let forbidden = search.forbidden();
     search.simplify();
-    (search.best, search.tried)
+    Chosen {
+        best: search.best,
+        tried: search.tried,
+        forbidden,
+    }
 }
 
 /// Drops what the evidence no longer asks for; what was tried is added to `tried`.
@@ -244,12 +255,17 @@ impl Search<'_> {
     /// stand for the other, and weights do not find from one such model to the other. Data that
     /// determine a spline are not of that kind.
     fn offsets(&mut self) -> bool {
-        let late = self.take_if_better(Alternative::Offsets, NEEDED_GAIN, add_offsets);
+        if !may_have_offsets(self.observations) {
+            return false;
+        }
+        let observations = self.observations;
+        let add = |model: &mut Model| add_offsets(model, observations);
+        let late = self.take_if_better(Alternative::Offsets, NEEDED_GAIN, add);
         if self.best.fit.model.has_spline() {
             return late;
         }
         let needed = if late { 0.0 } else { NEEDED_GAIN };
-        let mut fit = self.best.fit.changed(self.observations, add_offsets);
+        let mut fit = self.best.fit.changed(observations, add);
         fit.smoothness.put_offsets_first();
         self.take_fit_if_better(Alternative::OffsetsFirst, needed, fit) || late
     }
@@ -257,7 +273,30 @@ impl Search<'_> {
     /// Offsets on the best model, against a rival that is none of its own.
     fn offsets_beyond(&mut self, rival: f64) -> bool {
         self.best.evidence = rival;
-        self.take_if_better(Alternative::OffsetsForSpline, 0.0, add_offsets)
+        let observations = self.observations;
+        may_have_offsets(observations)
+            && self.take_if_better(Alternative::OffsetsForSpline, 0.0, |model| {
+                add_offsets(model, observations);
+            })
+    }
+
+    /// What offsets for all cameras would make of the best model, where some are declared to have none: by the better
+    /// of the two starts.
+    fn forbidden(&self) -> Option<Candidate> {
+        let cameras = 0..self.observations.sensors.len();
+        let mut declared = cameras.filter(|k| self.observations.is_declared_central(*k));
+        declared.next()?;
+        let late = self.best.fit.changed(self.observations, |model| {
+            for camera in model.cameras.iter_mut().filter(|c| c.offset().is_none()) {
+                camera.free_offset(OFFSET_DEGREE);
+            }
+        });
+        let mut first = late.clone();
+        first.smoothness.put_offsets_first();
+        [late, first]
+            .into_iter()
+            .filter_map(|fit| Candidate::settle(fit, f64::NEG_INFINITY, self.observations).ok())
+            .max_by(|a, b| a.evidence.total_cmp(&b.evidence))
     }
 
     /// Where offsets and a spline both seem needed, the lens underneath may be to blame: fitted as if all rays met
@@ -270,7 +309,8 @@ impl Search<'_> {
         }
         let mut fit = ideal.clone();
         fit.smoothness = Smoothness::new(&fit.model);
-        let mut fit = fit.changed(self.observations, add_offsets);
+        let observations = self.observations;
+        let mut fit = fit.changed(observations, |model| add_offsets(model, observations));
         fit.smoothness.put_offsets_first();
         // It comes from far, and would be given up before its offsets are where they can be.
         let from_far = Candidate::settle(fit, f64::NEG_INFINITY, self.observations);
@@ -390,10 +430,17 @@ impl Search<'_> {
     }
 }
 
-/// Gives every camera an offset.
-pub fn add_offsets(model: &mut Model) {
-    for camera in &mut model.cameras {
-        camera.free_offset(OFFSET_DEGREE);
+/// Whether any camera may have an offset.
+pub fn may_have_offsets(observations: &Observations) -> bool {
+    (0..observations.sensors.len()).any(|idx| !observations.is_declared_central(idx))
+}
+
+/// Gives every camera an offset that is not declared to have none.
+pub fn add_offsets(model: &mut Model, observations: &Observations) {
+    for (camera_idx, camera) in model.cameras.iter_mut().enumerate() {
+        if !observations.is_declared_central(camera_idx) {
+            camera.free_offset(OFFSET_DEGREE);
+        }
     }
 }
 

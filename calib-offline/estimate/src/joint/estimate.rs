@@ -1,6 +1,6 @@
 //! The estimate from start to end.
 
-use super::choice::{self, Candidate, Choice};
+use super::choice::{self, Candidate, Choice, Chosen};
 use super::error::EstimateError;
 use super::evidence::{Smoothness, SmoothnessFound};
 use super::fit::{Fit, LAST};
@@ -56,8 +56,19 @@ pub struct Estimate {
     pub costs: Vec<f64>,
     /// Why the last adjustment ended.
     pub stop: StopReason,
+    /// What offsets would have gained where some cameras are declared to have none.
+    pub forbidden: Option<Forbidden>,
     /// The fit behind it all.
     pub(crate) fit: Fit,
+}
+
+/// A model with offsets for all cameras, of which some are declared to have none.
+#[derive(Debug, Clone)]
+pub struct Forbidden {
+    /// Twice the log evidence that it would gain.
+    pub gain: f64,
+    /// The fit.
+    pub(crate) fit: Box<Fit>,
 }
 
 /// Estimates everything from a start.
@@ -92,13 +103,33 @@ pub fn estimate(observations: &Observations, start: &RigStart) -> Result<Estimat
     // What the evidence asks for beyond, first as if corners were independent: only a field that
     // fits shows how much they are not.
     let settled = Candidate::settle(fit, f64::NEG_INFINITY, &observations)?;
-    let (mut best, mut choices) = choice::choose(settled, Some(&ideal), &observations);
+    let Chosen {
+        mut best,
+        tried: mut choices,
+        mut forbidden,
+    } = choice::choose(settled, Some(&ideal), &observations);
     let correlation = best.fit.measure_correlation(&observations);
     if best.fit.share < 1.0 {
         best = Candidate::settle(best.fit, f64::NEG_INFINITY, &observations)?;
         best = choice::simplify(best, &mut choices, &observations);
+        forbidden = forbidden.and_then(|mut candidate| {
+            candidate.fit.share = best.fit.share;
+            Candidate::settle(candidate.fit, f64::NEG_INFINITY, &observations).ok()
+        });
     }
-    let mut fit = best.fit;
+    let forbidden = forbidden.map(|candidate| Forbidden {
+        gain: candidate.evidence - best.evidence,
+        fit: Box::new(candidate.fit),
+    });
+    let fit = anchored(best.fit, &observations);
+    Ok(Estimate {
+        forbidden,
+        ..finish(fit, observations, correlation, choices)
+    })
+}
+
+/// The last adjustments of a fit, with residuals taken where it sees the corners.
+pub(super) fn anchored(mut fit: Fit, observations: &Observations) -> Fit {
     for _ in 0..ANCHORS {
         let anchored = observations.anchored(fit.residuals());
         fit = fit.on(&anchored);
@@ -107,8 +138,7 @@ pub fn estimate(observations: &Observations, start: &RigStart) -> Result<Estimat
         }
         fit.adjust(&anchored, LAST);
     }
-    let fit = fit.on(&observations);
-    Ok(finish(fit, observations, correlation, choices))
+    fit.on(observations)
 }
 
 fn starting_model(start: &RigStart, observations: &Observations) -> Model {
@@ -159,6 +189,7 @@ pub(super) fn finish(
         neighbor_correlation,
         effective_share: fit.share,
         choices,
+        forbidden: None,
         costs: fit.costs.clone(),
         stop: fit.stop,
         fit,

@@ -17,6 +17,7 @@ pub mod point_covariance;
 pub mod rebase;
 pub mod recheck;
 pub mod refit;
+mod simpler;
 
 pub use choice::{Alternative, Choice};
 pub use error::EstimateError;
@@ -24,3 +25,4 @@ pub use estimate::{Estimate, estimate};
 pub use evidence::{Family, SmoothnessFound};
 pub use length_variance::{Ends, LengthVariance};
 pub use recheck::estimate_screened;
+pub use simpler::{Simpler, SimplerEstimate};

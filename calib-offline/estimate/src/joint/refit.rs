@@ -10,15 +10,6 @@ use super::pinholes::among_pinholes;
 use crate::adjust::{Model, Observations};
 use calib_rays::board::BoardShape;
 
-/// An estimate whose cameras are all central, and what that costs.
-#[derive(Debug, Clone)]
-pub struct CentralEstimate {
-    /// The estimate.
-    pub estimate: Estimate,
-    /// Twice the log evidence that the model with offsets is ahead of it.
-    pub evidence_loss: f64,
-}
-
 impl Estimate {
     /// The same model from some of the poses only (by their number in the dataset): fields, poses,
     /// extrinsics, board shape, smoothness weights and noise are found again; spline spacing,
@@ -66,23 +57,10 @@ impl Estimate {
         Ok(self.remade(settled.fit, observations))
     }
 
-    /// The same without the offsets of all cameras.
-    ///
-    /// # Errors
-    /// [`EstimateError::Singular`] if the data leave a parameter open.
-    pub fn made_central(&self) -> Result<CentralEstimate, EstimateError> {
-        let observations = self.observations.clone();
-        let with_offsets = self.fit.clone().round(&observations)?;
-        let fit = self.fit.changed(&observations, |model| {
-            for camera in &mut model.cameras {
-                camera.drop_offset();
-            }
-        });
-        let central = settled(fit, &observations)?;
-        Ok(CentralEstimate {
-            evidence_loss: with_offsets - central.evidence,
-            estimate: self.remade(central.fit, observations),
-        })
+    /// The same with offsets for all cameras, where some are declared to have none.
+    pub fn made_non_central(&self) -> Option<Self> {
+        let fit = (*self.forbidden.as_ref()?.fit).clone();
+        Some(self.remade(fit, self.observations.clone()))
     }
 
     /// Numbers that the data determine, poses apart.
@@ -134,7 +112,7 @@ impl Estimate {
 }
 
 /// Rounds until the evidence settles, then steps until the fit does.
-fn settled(fit: Fit, observations: &Observations) -> Result<Candidate, EstimateError> {
+pub(super) fn settled(fit: Fit, observations: &Observations) -> Result<Candidate, EstimateError> {
     let mut candidate = Candidate::settle(fit, f64::NEG_INFINITY, observations)?;
     if are_pinholes(&candidate.fit.model) {
         let pinholes = among_pinholes(&candidate.fit, observations);

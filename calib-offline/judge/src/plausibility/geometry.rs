@@ -35,8 +35,10 @@ const ASKED: usize = 40;
 
 /// A recording as the design sees it.
 pub struct Geometry {
-    /// Different poses.
+    /// Different poses that are placed.
     pub poses: usize,
+    /// Different poses that are not: no camera explains what it saw of them as well as the others.
+    pub unplaced: usize,
     /// Angles between the boards' normals and the middle one: RMS, degrees.
     pub tilt_rms_deg: f64,
     /// Nearest, middle and farthest board's middle along the first camera's axis, mm.
@@ -110,11 +112,13 @@ pub fn geometry(look: &Look<'_>, placed: &Placed, same_as: &[usize]) -> Option<G
     let mut design = Design::new(cameras);
     let board = &look.dataset.board;
     let mut boards: Vec<RigidTransform> = Vec::new();
+    let mut unplaced = 0;
     for (pose_idx, same) in same_as.iter().enumerate() {
         if *same != pose_idx {
             continue;
         }
         let Some(rig_from_board) = placed.rig_from_board[pose_idx] else {
+            unplaced += 1;
             continue;
         };
         let views = look.observations.views.iter().zip(&look.fits);
@@ -161,6 +165,7 @@ pub fn geometry(look: &Look<'_>, placed: &Placed, same_as: &[usize]) -> Option<G
         .collect();
     Some(Geometry {
         poses: boards.len(),
+        unplaced,
         tilt_rms_deg: calib_rays::numerics::rms(&tilts)?,
         distance_mm,
         error_mm: error * sigma_px,
@@ -264,9 +269,15 @@ pub fn causes(found: &Geometry) -> Vec<Cause> {
             format!("{} poses", found.poses),
             found.error_mm,
             format!(
-                "{} different poses are few: half of them give hardly a calibration to compare with; record \
+                "{} different poses are few{}: half of them give hardly a calibration to compare with; record \
                  {FEW_POSES} or more, at other tilts and distances",
-                found.poses
+                found.poses,
+                match found.unplaced {
+                    0 => String::new(),
+                    count => format!(
+                        " ({count} more do not count: no camera explains its view of them as well as of the others)"
+                    ),
+                }
             ),
         ));
     }

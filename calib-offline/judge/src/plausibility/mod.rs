@@ -17,6 +17,7 @@ mod image_size;
 mod look;
 mod measured;
 mod mirrored;
+mod misread;
 mod numbering;
 mod placed;
 mod reading;
@@ -30,6 +31,7 @@ mod units;
 mod whole_camera;
 
 pub use finding::Explained;
+pub use misread::{FITS_PER_WIDTH, Misread, misread};
 pub use sheet::Sheet;
 pub use stage_angles::{Dial, dial};
 pub use units::units_of_places;

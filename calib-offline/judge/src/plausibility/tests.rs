@@ -36,6 +36,7 @@ fn recording(optics: OpticsKind, seed: u64) -> (Dataset, Vec<View>) {
             .collect(),
         stage: None,
         known_poses: [].into(),
+        known_poses_file: None,
         excluded_poses: [].into(),
         target: None,
         certificate: None,
