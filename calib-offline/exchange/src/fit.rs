@@ -1,6 +1,7 @@
 //! The lens that sees points nearest to their pixels, and the turn of the frame that goes with it.
 
-use super::lens::{Distortion, Lens, NUMBERS};
+use super::distortion::{Distortion, MOST_COEFFICIENTS};
+use super::lens::{Lens, NUMBERS};
 use calib_rays::geometry::so3::{self, skew};
 use calib_rays::geometry::{PixelPoint, SensorSize};
 use calib_rays::numerics::levenberg::{self, Problem, Tried};
@@ -31,34 +32,59 @@ pub(super) type Sample = (PixelPoint, Vector3<f64>);
 /// A lens and `new_from_old`, the turn into its frame.
 pub(super) type Turned = (Lens, Matrix3<f64>);
 
-/// The lens without distortion that comes nearest, as it stands; `None` where points lie beside or behind it, or the image
-/// is mirrored.
-pub(super) fn ideal(sensor: SensorSize, samples: &[Sample]) -> Option<Turned> {
+/// The lens without distortion that comes nearest, as it stands: a fisheye or a pinhole. `None` where a pinhole has points beside or
+/// behind it, or the image is mirrored.
+pub(super) fn ideal(sensor: SensorSize, is_fisheye: bool, samples: &[Sample]) -> Option<Turned> {
     let count = samples.len() as f64;
-    let along = |at: fn(&Sample) -> (f64, f64)| {
+    let place = |point: &Vector3<f64>| {
+        if is_fisheye {
+            let across = point.xy().norm();
+            point.xy()
+                * if across > 0.0 {
+                    across.atan2(point.z) / across
+                } else {
+                    0.0
+                }
+        } else {
+            point.xy() / point.z
+        }
+    };
+    let places: Vec<Vector2<f64>> = samples.iter().map(|(_, point)| place(point)).collect();
+    let along = |axis: usize, px: fn(&PixelPoint) -> f64| {
+        let pairs = || {
+            places
+                .iter()
+                .zip(samples)
+                .map(|(place, (pixel, _))| (place[axis], px(pixel)))
+        };
         let (mut mean_ideal, mut mean_px) = (0.0, 0.0);
-        for (ideal, px) in samples.iter().map(at) {
+        for (ideal, px) in pairs() {
             mean_ideal += ideal / count;
             mean_px += px / count;
         }
         let (mut square, mut product) = (0.0, 0.0);
-        for (ideal, px) in samples.iter().map(at) {
+        for (ideal, px) in pairs() {
             square += (ideal - mean_ideal).powi(2);
             product += (ideal - mean_ideal) * (px - mean_px);
         }
         let focal_px = product / square;
         (focal_px, mean_px - focal_px * mean_ideal)
     };
-    let (fx, cx) = along(|(pixel, point)| (point.x / point.z, pixel.u));
-    let (fy, cy) = along(|(pixel, point)| (point.y / point.z, pixel.v));
-    let is_in_front = samples.iter().all(|(_, point)| point.z > 0.0);
-    (is_in_front && fx > 0.0 && fy > 0.0).then(|| {
+    let (fx, cx) = along(0, |pixel| pixel.u);
+    let (fy, cy) = along(1, |pixel| pixel.v);
+    let is_seen = is_fisheye || samples.iter().all(|(_, point)| point.z > 0.0);
+    (is_seen && fx > 0.0 && fy > 0.0).then(|| {
+        let distortion = if is_fisheye {
+            Distortion::Equidistant
+        } else {
+            Distortion::Four
+        };
         let lens = Lens {
             sensor,
             focal_px: [fx, fy],
             center_px: [cx, cy],
-            coefficients: [0.0; 8],
-            distortion: Distortion::Four,
+            coefficients: [0.0; MOST_COEFFICIENTS],
+            distortion,
         };
         (lens, Matrix3::identity())
     })

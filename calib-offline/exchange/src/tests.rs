@@ -8,8 +8,8 @@ use calib_simulate::optics::Lens as TrueLens;
 use calib_simulate::{OpticsKind, Scene, SceneSettings};
 use nalgebra::Vector3;
 
-const SENSOR: SensorSize = SensorSize::new(1280, 1024);
-const BROWN: BrownCamera = BrownCamera {
+pub(super) const SENSOR: SensorSize = SensorSize::new(1280, 1024);
+pub(super) const BROWN: BrownCamera = BrownCamera {
     sensor: SENSOR,
     focal_px: [1745.0, 1746.2],
     center_px: [652.5, 500.5],
@@ -17,9 +17,9 @@ const BROWN: BrownCamera = BrownCamera {
 };
 
 /// Cameras by their rays in their own frames.
-struct Known<F> {
-    rig_from_camera: Vec<RigidTransform>,
-    ray: F,
+pub(super) struct Known<F> {
+    pub rig_from_camera: Vec<RigidTransform>,
+    pub ray: F,
 }
 
 impl<F: Fn(usize, PixelPoint) -> Option<Ray> + Sync> RaySource for Known<F> {
@@ -43,7 +43,7 @@ impl<F: Fn(usize, PixelPoint) -> Option<Ray> + Sync> RaySource for Known<F> {
     }
 }
 
-fn place(turn: [f64; 3], at_mm: [f64; 3]) -> RigidTransform {
+pub(super) fn place(turn: [f64; 3], at_mm: [f64; 3]) -> RigidTransform {
     RigidTransform::new(so3::exp(&Vector3::from(turn)), Vector3::from(at_mm))
 }
 

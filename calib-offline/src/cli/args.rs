@@ -2,8 +2,8 @@
 
 use super::settings::CommonArgs;
 use super::{
-    calibrate, compare, demo, detect, device, evaluate, export, flash, inspect, measure, methods,
-    pack, rays, simulate, target, verify,
+    audit, calibrate, compare, demo, detect, device, evaluate, export, flash, import, inspect,
+    measure, methods, pack, rays, simulate, target, verify,
 };
 use clap::{Parser, Subcommand};
 
@@ -50,6 +50,8 @@ pub struct Cli {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Verb {
+    /// Judge calibrations, by other tools too, on a dataset beside our own estimate of it
+    Audit(audit::AuditArgs),
     /// Calibrate from a dataset: calibration.json, rig.rays and report.html
     Calibrate(calibrate::CalibrateArgs),
     /// Compare two calibrations of one rig: their difference, beside the predicted one
@@ -66,6 +68,8 @@ pub enum Verb {
     Export(export::ExportArgs),
     /// Send a blob to a device
     Flash(flash::FlashArgs),
+    /// Take a calibration by another tool: ours, with what was lost
+    Import(import::ImportArgs),
     /// Say what a dataset, a calibration or a blob is
     Inspect(inspect::InspectArgs),
     /// Triangulate matches

@@ -12,8 +12,9 @@ use crate::pipeline::{CalibrateError, CalibrateSettings, Calibrated};
 use crate::report::facts::Facts;
 use crate::report::record::{ExpectedError, Grade};
 use crate::report::{BlobFacts, Calibration, html, text};
-use calib_blob::pack::{PackSettings, pack_nearest};
+use calib_blob::pack::{PackError, PackSettings, Packed, Packer};
 use calib_exchange::dense::array_name;
+use calib_rays::field::Rig;
 use calib_rays::progress::Progress;
 use calib_recording::atomic_file::{make_folder, write_set};
 use calib_recording::dataset::Dataset;
@@ -65,9 +66,11 @@ With --json, schema calib-offline/calibrate/1; a figure that does not apply is n
   baseline_mm, axes_angle_deg    from the first camera to each other one, between these pinholes
   working_distance_mm (least, median, most)
   poses_used, views_used, left_out, corners_used, corners_rejected
-  blob (bytes, max_error_px, max_error_mm, wanted_error_px, curve (bytes, error_px, error_mm))
-                                 mm at the working distance; larger than wanted only where f32
-                                 cannot say it better; curve: other sizes of all tables
+  blob (bytes, max_error_px, max_error_mm, wanted_error_px, search_ended_early,
+    curve (bytes, error_px, error_mm))
+                                 mm at the working distance; larger than wanted only where no table
+                                 tried holds it, or the search ended at the work that packing may
+                                 take; curve: other sizes of all tables
   calibration, rig, report       the three files";
 
 /// The blob's bound unless `pack` is asked for another: this share of the corners' standard deviation adds a
@@ -271,11 +274,9 @@ pub fn write_results(
         calibration,
         ray_tables,
     } = calibrated;
-    console.progress().begin("packing the blob", 0);
     let max_error_px = blob_max_error_px(&calibration);
-    let packed = pack_nearest(&calibration.rig, &pack_settings(&calibration, max_error_px));
-    console.progress().end();
-    let packed = packed?;
+    let settings = pack_settings(&calibration, max_error_px);
+    let packed = watched(&calibration.rig, &settings, console, Packer::nearest)?;
     let blob = BlobFacts::new(&packed, max_error_px);
     if let Some(warning) = blob.warning() {
         console.warn(&warning);
@@ -313,6 +314,23 @@ pub fn write_results(
         blob,
         files,
     })
+}
+
+/// Packs while the console shows how far it is.
+///
+/// # Errors
+/// What packing gives.
+pub fn watched<'a>(
+    rig: &'a Rig,
+    settings: &PackSettings,
+    console: &'a Console,
+    pack: impl FnOnce(&mut Packer<'a>) -> Result<Packed, PackError>,
+) -> Result<Packed, PackError> {
+    let progress = console.progress();
+    progress.begin("packing the blob", 0);
+    let packed = Packer::new(rig, settings, progress).and_then(|mut packer| pack(&mut packer));
+    progress.end();
+    packed
 }
 
 /// How a calibration is packed: at its working distance, under its own identity.

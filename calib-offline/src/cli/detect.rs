@@ -273,6 +273,7 @@ mod tests {
             }],
             stage: None,
             known_poses: [].into(),
+            known_poses_file: None,
             excluded_poses: std::collections::BTreeSet::new(),
             target: None,
             certificate: None,

@@ -10,7 +10,10 @@ use crate::report::store::CalibrationError;
 use calib_blob::export::ExportError;
 use calib_blob::matches::{LengthsError, MatchesError, NoiseError, PixelsError};
 use calib_blob::pack::{BlobError, PackError};
-use calib_exchange::ExchangeError;
+use calib_exchange::mesh::MeshError;
+use calib_exchange::ply::PointsError;
+use calib_exchange::undistort::UndistortError;
+use calib_exchange::{ExchangeError, ImportError};
 use calib_rays::remedy::Remedy;
 use calib_recording::atomic_file::WriteError;
 use calib_recording::dataset::{CornersError, ManifestError, SufficiencyError};
@@ -69,6 +72,18 @@ pub enum Error {
     /// A rig that was to be written for another tool.
     #[error("the rig cannot be exported")]
     Exchange(#[from] ExchangeError),
+    /// A mesh that was to be made.
+    #[error("the mesh cannot be made")]
+    Mesh(#[from] MeshError),
+    /// Images that were to be undistorted.
+    #[error("the images cannot be undistorted")]
+    Undistort(#[from] UndistortError),
+    /// Points that were to be written as a cloud.
+    #[error("the points cannot be exported")]
+    Points(#[from] PointsError),
+    /// A calibration by another tool.
+    #[error("the calibration of another tool cannot be used")]
+    Import(#[from] ImportError),
     /// A device that did not do what it was asked for.
     #[error("the device cannot be used")]
     Device(#[from] DeviceError),
@@ -167,7 +182,9 @@ impl Error {
             Self::Verify(error) => error.is_undetermined(),
             Self::Target(error) => matches!(error, TargetError::AllRefused { .. }),
             Self::Pack(error) => matches!(error, PackError::NothingCalibrated { .. }),
-            Self::Exchange(error) => matches!(error, ExchangeError::TooFewRays { .. }),
+            Self::Exchange(error) | Self::Mesh(MeshError::Rays(error)) => {
+                matches!(error, ExchangeError::TooFewRays { .. })
+            }
             Self::Noise(error) => !matches!(error, NoiseError::NothingPredicted),
             _ => false,
         };
@@ -197,6 +214,10 @@ impl Remedy for Error {
             Self::Pack(error) => error.remedy(),
             Self::Export(error) => error.remedy(),
             Self::Exchange(error) => error.remedy(),
+            Self::Mesh(error) => error.remedy(),
+            Self::Undistort(error) => error.remedy(),
+            Self::Points(error) => error.remedy(),
+            Self::Import(error) => error.remedy(),
             Self::Device(error) => error.remedy(),
             Self::Write(error) => error.remedy(),
             Self::Demo(error) => error.remedy(),

@@ -50,6 +50,7 @@ fn of_manifest(error: &ManifestError) -> Option<Code> {
 fn of_calibration(error: &CalibrateError) -> Option<Code> {
     match error {
         CalibrateError::Corners(error) => of_corners(error),
+        CalibrateError::Misread { known, .. } => known.code(),
         CalibrateError::Detect(DetectError::BrokenImage { source, .. }) => match &**source {
             ImageError::WrongSize {
                 found, expected, ..
@@ -78,9 +79,9 @@ fn of_calibration(error: &CalibrateError) -> Option<Code> {
         CalibrateError::Sufficiency(source) | CalibrateError::FewImages { source, .. } => {
             match source {
                 SufficiencyError::SameView { .. } => Some(Code::Duplicates),
-                SufficiencyError::TooFewPoses { .. } | SufficiencyError::Flat { .. } => {
-                    Some(Code::FewPoses)
-                }
+                SufficiencyError::TooFewPoses { .. }
+                | SufficiencyError::Flat { .. }
+                | SufficiencyError::FewPoints { .. } => Some(Code::FewPoses),
                 _ => None,
             }
         }

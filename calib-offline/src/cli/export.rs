@@ -2,52 +2,29 @@
 
 use super::Outcome;
 use super::error::Error;
-use super::export_folder::{self, FolderForm, LossObject};
+use super::export_folder;
+use super::export_form::FolderForm;
+use super::export_help::{EXAMPLE, FORMATS};
+use super::export_loss::LossObject;
+use super::export_mesh::{self, MeshArgs, MeshLoss};
+use super::export_options::FolderArgs;
 use super::output::Console;
 use super::place::check_file;
 use super::rig_file::{RigFile, open};
 use super::usage_error::UsageError;
 use calib_blob::export::{self, ExportError, Form};
+use calib_exchange::mesh::MeshFormat;
+use calib_exchange::ply;
 use calib_recording::atomic_file;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-const EXAMPLE: &str = "\
-Example:
-  calib-offline export rig.rays -o rig.hex --format hex --base-address 0x08100000
-  calib-offline export rig.rays -o rig.uf2 --format uf2 --base-address 0x10100000 --family 0xe48bff56
-  calib-offline export rig.rays -o rig.c --format c --name rig_blob
-  calib-offline export calibration.json -o opencv --format opencv";
-
-const FORMATS: &str = "\
-hex, uf2, bin and c take a blob and write one file. The base address is where it goes in the device's memory: a
-multiple of 8, of 256 for uf2, whose last page is filled up with 0xff. The C source defines an
-array, aligned to 8, and its length NAME_len (ray-runtime/c/rays.h opens it). An earlier file of the same
-form is replaced; any other only with --force.
-
-The others take a blob or a calibration.json and write a folder; files in it are replaced only with --force.
-opencv  NAME.yml a camera and extrinsics.yml (R, T: the second camera from the first, mm)
-ros     NAME.yaml a camera (camera_info); where the cameras stand is lost
-kalibr  camchain.yaml, in meters
-npy     rays_NAME.npy a camera, as --ray-tables of calibrate writes them, and rays.json: shapes and units
-The first three hold the pinholes that come nearest to the rays of the calibrated area at the working
-distance, with 5 coefficients, or with 8 where these lose a fifth less (kalibr: 4). What they lose is
-printed and written to FOLDER.loss.json.
-
-With --json, schema calib-offline/export/1:
-  output, format
-  file_bytes    of all files
-  blob_bytes, base_address, family, name    null where the form has none
-  files    those of a folder; else null
-  loss (rms_px, max_px, rms_mm, max_mm, distance_mm,
-    cameras (name, coefficients, rms_px, max_px, rms_mm, max_mm))    of pinholes; else null";
-
 /// The arguments.
 #[derive(Debug, Args)]
 #[command(before_help = EXAMPLE, after_help = FORMATS)]
 pub struct ExportArgs {
-    /// The blob, or a calibration.json for the forms of other tools
+    /// The blob, or a calibration.json for the forms of other tools; for ply a points.csv
     #[arg(value_name = "RIG")]
     pub rig: PathBuf,
     /// The file or the folder to write
@@ -69,6 +46,12 @@ pub struct ExportArgs {
         help = "The name of the array, for c [default: rays_blob]"
     )]
     pub name: Option<String>,
+    /// What the forms of other tools take.
+    #[command(flatten)]
+    pub folder: FolderArgs,
+    /// What meshes take.
+    #[command(flatten)]
+    pub mesh: MeshArgs,
     /// Replace whatever stands in the output's place
     #[arg(long)]
     pub force: bool,
@@ -94,9 +77,40 @@ pub enum FormatArg {
     /// ROS' `camera_info`.
     #[value(help = "ROS' camera_info, a folder")]
     Ros,
+    /// mrcal's pinholes.
+    #[value(help = "mrcal's .cameramodel, LENSMODEL_OPENCV, a folder")]
+    Mrcal,
+    /// mrcal's splined model.
+    #[value(help = "mrcal's .cameramodel, splined stereographic, a folder")]
+    MrcalSplined,
+    /// Maps for `cv::remap`.
+    #[value(help = "Maps that undistort each camera, for OpenCV's remap, a folder")]
+    Remap,
+    /// Maps of a rectified pair.
+    #[value(help = "Maps and matrices of a rectified stereo pair, a folder")]
+    Rectify,
+    /// Undistorted images
+    Undistort,
     /// The rays themselves.
     #[value(help = "The ray of every pixel as NumPy arrays, a folder")]
     Npy,
+    /// TI's LDC.
+    #[value(help = "The offsets of TI's LDC, a folder")]
+    MeshTi,
+    /// NXP's DW100.
+    #[value(help = "The vertices of NXP's DW100, a folder")]
+    MeshDw100,
+    /// NVIDIA's VPI.
+    #[value(help = "The warp map of NVIDIA's VPI, a folder")]
+    MeshVpi,
+    /// Luxonis' `StereoDepth`.
+    #[value(help = "The mesh of Luxonis' StereoDepth, a folder")]
+    MeshLuxonis,
+    /// An array.
+    #[value(help = "A mesh as a NumPy array, a folder")]
+    Mesh,
+    /// Points as PLY
+    Ply,
 }
 
 impl FormatArg {
@@ -109,7 +123,18 @@ impl FormatArg {
             Self::OpenCv => "opencv",
             Self::Kalibr => "kalibr",
             Self::Ros => "ros",
+            Self::Mrcal => "mrcal",
+            Self::MrcalSplined => "mrcal-splined",
+            Self::Remap => "remap",
+            Self::Rectify => "rectify",
+            Self::Undistort => "undistort",
             Self::Npy => "npy",
+            Self::MeshTi => "mesh-ti",
+            Self::MeshDw100 => "mesh-dw100",
+            Self::MeshVpi => "mesh-vpi",
+            Self::MeshLuxonis => "mesh-luxonis",
+            Self::Mesh => "mesh",
+            Self::Ply => "ply",
         }
     }
 
@@ -123,7 +148,18 @@ impl FormatArg {
             Self::OpenCv => Kind::Folder(FolderForm::OpenCv),
             Self::Kalibr => Kind::Folder(FolderForm::Kalibr),
             Self::Ros => Kind::Folder(FolderForm::Ros),
+            Self::Mrcal => Kind::Folder(FolderForm::Mrcal),
+            Self::MrcalSplined => Kind::Folder(FolderForm::MrcalSplined),
+            Self::Remap => Kind::Folder(FolderForm::Remap),
+            Self::Rectify => Kind::Folder(FolderForm::Rectify),
+            Self::Undistort => Kind::Folder(FolderForm::Undistort),
             Self::Npy => Kind::Folder(FolderForm::Npy),
+            Self::MeshTi => Kind::Mesh(MeshFormat::Ti),
+            Self::MeshDw100 => Kind::Mesh(MeshFormat::Dw100),
+            Self::MeshVpi => Kind::Mesh(MeshFormat::Vpi),
+            Self::MeshLuxonis => Kind::Mesh(MeshFormat::Luxonis),
+            Self::Mesh => Kind::Mesh(MeshFormat::Plain),
+            Self::Ply => Kind::Points,
         }
     }
 }
@@ -133,6 +169,8 @@ enum Kind {
     /// How every file of the form begins.
     File(&'static [u8]),
     Folder(FolderForm),
+    Mesh(MeshFormat),
+    Points,
 }
 
 const SCHEMA: &str = "calib-offline/export/1";
@@ -149,7 +187,23 @@ struct ExportObject<'a> {
     family: Option<u32>,
     name: Option<&'a str>,
     files: Option<&'a [PathBuf]>,
-    loss: Option<&'a LossObject>,
+    loss: Option<LossOf<'a>>,
+    points: Option<PointsObject>,
+}
+
+/// Whose loss.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+enum LossOf<'a> {
+    Lenses(&'a LossObject),
+    Meshes(&'a MeshLoss),
+}
+
+#[derive(Debug, Serialize)]
+struct PointsObject {
+    count: usize,
+    left_out: usize,
+    has_sigma: bool,
 }
 
 /// Runs the command.
@@ -161,31 +215,101 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<Outcome, Error> {
     match args.format.kind() {
         Kind::File(start) => write_file(args, start, console),
         Kind::Folder(form) => write_folder(args, form, console),
+        Kind::Mesh(format) => write_mesh(args, format, console),
+        Kind::Points => write_points(args, console),
     }
 }
 
 fn write_folder(args: &ExportArgs, form: FolderForm, console: &Console) -> Result<Outcome, Error> {
-    let written = export_folder::write(&args.rig, form, &args.output, args.force)?;
+    let written = export_folder::write(&args.rig, form, &args.folder, &args.output, args.force)?;
+    let lost = written.loss.iter().map(LossObject::in_words);
+    let notes: Vec<String> = lost.chain(written.notes).collect();
+    let loss = written.loss.as_ref().map(LossOf::Lenses);
+    tell_of_folder(args, &written.files, written.bytes, &notes, loss, console);
+    Ok(Outcome::Done)
+}
+
+fn write_mesh(args: &ExportArgs, format: MeshFormat, console: &Console) -> Result<Outcome, Error> {
+    let distance_mm = args.folder.distance_mm;
+    let (files, bytes, loss) = export_mesh::write(
+        &args.rig,
+        (format, distance_mm),
+        &args.mesh,
+        &args.output,
+        args.force,
+    )?;
+    let notes = [loss.in_words()];
+    tell_of_folder(
+        args,
+        &files,
+        bytes,
+        &notes,
+        Some(LossOf::Meshes(&loss)),
+        console,
+    );
+    Ok(Outcome::Done)
+}
+
+fn tell_of_folder(
+    args: &ExportArgs,
+    files: &[PathBuf],
+    file_bytes: usize,
+    notes: &[String],
+    loss: Option<LossOf<'_>>,
+    console: &Console,
+) {
     let object = ExportObject {
         schema: SCHEMA,
         output: &args.output,
         format: args.format.name(),
         blob_bytes: None,
-        file_bytes: written.bytes,
+        file_bytes,
         base_address: None,
         family: None,
         name: None,
-        files: Some(&written.files),
-        loss: written.loss.as_ref(),
+        files: Some(files),
+        loss,
+        points: None,
     };
-    let lost = match &written.loss {
-        Some(loss) => format!("; {}", loss.in_words()),
-        None => String::new(),
-    };
-    let words = format!(
-        "{} files of {} written to {}{lost}",
-        written.files.len(),
+    let mut words = format!(
+        "{} files of {} written to {}",
+        files.len(),
         args.format.name(),
+        args.output.display()
+    );
+    for note in notes {
+        words += "; ";
+        words += note;
+    }
+    console.result(&words, &object);
+}
+
+fn write_points(args: &ExportArgs, console: &Console) -> Result<Outcome, Error> {
+    check_file(&args.output, ply::START, &[&args.rig], args.force)?;
+    let cloud = ply::read(&args.rig)?;
+    atomic_file::write(&args.output, &cloud.bytes)?;
+    let object = ExportObject {
+        schema: SCHEMA,
+        output: &args.output,
+        format: args.format.name(),
+        blob_bytes: None,
+        file_bytes: cloud.bytes.len(),
+        base_address: None,
+        family: None,
+        name: None,
+        files: None,
+        loss: None,
+        points: Some(PointsObject {
+            count: cloud.count,
+            left_out: cloud.left_out,
+            has_sigma: cloud.has_sigma,
+        }),
+    };
+    let sigma = if cloud.has_sigma { ", with sigma" } else { "" };
+    let words = format!(
+        "{} points{sigma}, {} rows without one left out; written to {}",
+        cloud.count,
+        cloud.left_out,
         args.output.display()
     );
     console.result(&words, &object);
@@ -218,6 +342,7 @@ fn write_file(args: &ExportArgs, start: &[u8], console: &Console) -> Result<Outc
         },
         files: None,
         loss: None,
+        points: None,
     };
     let place = match (args.base_address, object.name) {
         (Some(first), _) => {
@@ -249,8 +374,20 @@ fn check_options(args: &ExportArgs) -> Result<(), ExportError> {
         ),
         ("--name", args.name.is_some() && args.format != FormatArg::C),
     ];
-    match needless.into_iter().find(|(_, is_needless)| *is_needless) {
-        Some((option, _)) => Err(ExportError::NeedlessOption { form, option }),
+    let kind = args.format.kind();
+    let is_mesh = matches!(kind, Kind::Mesh(_));
+    let folder_form = match kind {
+        Kind::Folder(form) => Some(form),
+        Kind::File(_) | Kind::Mesh(_) | Kind::Points => None,
+    };
+    let of_meshes = args.mesh.given().into_iter();
+    let found = needless
+        .into_iter()
+        .chain(of_meshes.map(|(option, is_given)| (option, is_given && !is_mesh)))
+        .find(|(_, is_needless)| *is_needless);
+    let option = found.map(|(option, _)| option);
+    match option.or_else(|| args.folder.needless(folder_form, is_mesh)) {
+        Some(option) => Err(ExportError::NeedlessOption { form, option }),
         None => Ok(()),
     }
 }

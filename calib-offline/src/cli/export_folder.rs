@@ -2,27 +2,20 @@
 
 use super::calibrate::{blob_max_error_px, pack_settings};
 use super::error::Error;
+use super::export_form::FolderForm;
+use super::export_loss::{LossFile, LossObject};
+use super::export_options::FolderArgs;
 use super::place::check_results_folder;
 use super::rig_file::{RigFile, open};
 use super::usage_error::UsageError;
-use crate::present::numbers::short;
 use calib_blob::rays::RaySource;
 use calib_exchange::{
-    Distortion, ExchangeError, Loss, NamedFile, Pinholes, dense, kalibr, nearest_pinholes, opencv,
-    ros,
+    ExchangeError, LossMap, NamedFile, Pinholes, ViewMap, Within, dense, kalibr, mrcal,
+    nearest_pinholes, nearest_splined, opencv, rectify, remap, ros, undistort,
 };
 use calib_recording::atomic_file::{check_place, make_folder, write_set};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-
-/// A form for other tools.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum FolderForm {
-    OpenCv,
-    Kalibr,
-    Ros,
-    Npy,
-}
 
 /// What was written.
 #[derive(Debug, Serialize)]
@@ -31,59 +24,40 @@ pub(super) struct Written {
     #[serde(skip)]
     pub bytes: usize,
     pub loss: Option<LossObject>,
+    /// What else must be known, in words.
+    #[serde(skip)]
+    pub notes: Vec<String>,
 }
 
-/// What pinholes lose: the file `PATH.loss.json`.
-#[derive(Debug, Serialize)]
-pub(super) struct LossObject {
-    #[serde(flatten)]
-    all: Loss,
-    distance_mm: f64,
-    cameras: Vec<CameraLoss>,
+/// What a form consists of.
+#[derive(Default)]
+struct Contents {
+    files: Vec<NamedFile>,
+    loss: Option<LossObject>,
+    maps: Vec<LossMap>,
+    notes: Vec<String>,
 }
 
-#[derive(Debug, Serialize)]
-struct CameraLoss {
-    name: String,
-    coefficients: usize,
-    #[serde(flatten)]
-    loss: Loss,
-}
-
-impl LossObject {
-    fn new(pinholes: &Pinholes) -> Self {
-        let cameras = pinholes.cameras.iter();
+impl Contents {
+    fn of_lenses(files: Vec<NamedFile>, lenses: Pinholes) -> Self {
         Self {
-            all: pinholes.loss(),
-            distance_mm: pinholes.distance_mm,
-            cameras: cameras
-                .map(|camera| CameraLoss {
-                    name: camera.name.clone(),
-                    coefficients: camera.lens.distortion.count(),
-                    loss: camera.loss,
-                })
+            files,
+            loss: Some(LossObject::of_lenses(&lenses)),
+            maps: lenses
+                .cameras
+                .into_iter()
+                .map(|camera| camera.map)
                 .collect(),
+            ..Self::default()
         }
     }
 
-    /// A sentence.
-    pub fn in_words(&self) -> String {
-        let cameras = self.cameras.iter().map(|camera| {
-            let loss = &camera.loss;
-            format!(
-                "{}: {} px RMS, {} px at most ({} mm, {} mm)",
-                camera.name,
-                short(loss.rms_px),
-                short(loss.max_px),
-                short(loss.rms_mm),
-                short(loss.max_mm)
-            )
-        });
-        format!(
-            "lost by the pinholes at {} mm: {}",
-            short(self.distance_mm),
-            cameras.collect::<Vec<_>>().join("; ")
-        )
+    fn of_views(files: Vec<NamedFile>, maps: &[ViewMap], distance_mm: f64) -> Self {
+        Self {
+            files,
+            loss: Some(LossObject::of_views(maps, distance_mm)),
+            ..Self::default()
+        }
     }
 }
 
@@ -94,26 +68,59 @@ impl LossObject {
 pub(super) fn write(
     rig: &Path,
     form: FolderForm,
+    options: &FolderArgs,
     folder: &Path,
     force: bool,
 ) -> Result<Written, Error> {
-    let (files, loss) = match RigFile::read(rig)? {
+    let Contents {
+        files,
+        loss,
+        maps,
+        notes,
+    } = match RigFile::read(rig)? {
         RigFile::Blob(bytes) => {
             let blob = open(&bytes, rig)?;
-            contents(form, &blob, blob.working_distance_mm().into())?
+            contents(form, options, &blob, blob.working_distance_mm().into())?
         }
         RigFile::Calibration(calibration) => {
             let packed = pack_settings(&calibration, blob_max_error_px(&calibration));
-            contents(form, &calibration.rig, packed.working_distance_mm)?
+            contents(form, options, &calibration.rig, packed.working_distance_mm)?
         }
     };
+    if let (Some(images), Ok(place)) = (&options.images, folder.canonicalize())
+        && images.canonicalize().is_ok_and(|images| images == place)
+    {
+        return Err(Error::Usage(UsageError::OutputIsInput {
+            path: folder.to_owned(),
+        }));
+    }
+    let with_maps = loss.as_ref().map(|loss| LossFile { loss, maps: &maps });
+    let (files, bytes) = put(folder, files, with_maps.as_ref(), force)?;
+    Ok(Written {
+        files,
+        bytes,
+        loss,
+        notes,
+    })
+}
+
+/// Writes files into a folder, and what they lose beside it; the files and how long they are.
+///
+/// # Errors
+/// [`Error`], with nothing written.
+pub(super) fn put(
+    folder: &Path,
+    files: Vec<NamedFile>,
+    loss: Option<&impl Serialize>,
+    force: bool,
+) -> Result<(Vec<PathBuf>, usize), Error> {
     let names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
     check_results_folder(folder, &names, force)?;
     let mut files: Vec<(PathBuf, Vec<u8>)> = files
         .into_iter()
         .map(|(name, content)| (folder.join(name), content))
         .collect();
-    if let Some(loss) = &loss {
+    if let Some(loss) = loss {
         let path = loss_path(folder);
         if !force && path.exists() {
             return Err(Error::Usage(UsageError::Exists { path }));
@@ -138,41 +145,102 @@ pub(super) fn write(
         }
         return Err(error.into());
     }
-    Ok(Written {
-        bytes: files.iter().map(|(_, content)| content.len()).sum(),
-        files: files.into_iter().map(|(path, _)| path).collect(),
-        loss,
-    })
+    let bytes = files.iter().map(|(_, content)| content.len()).sum();
+    Ok((files.into_iter().map(|(path, _)| path).collect(), bytes))
 }
 
 /// The files of a form, and what they lose.
 fn contents(
     form: FolderForm,
+    options: &FolderArgs,
     source: &dyn RaySource,
-    distance_mm: f64,
-) -> Result<(Vec<NamedFile>, Option<LossObject>), Error> {
+    working_distance_mm: f64,
+) -> Result<Contents, Error> {
     check_names(source)?;
-    let pinholes = |forms: &[Distortion]| nearest_pinholes(source, distance_mm, forms);
-    let (files, pinholes) = match form {
+    let region = options
+        .region
+        .map(|region| Within::new(source, region))
+        .transpose()?;
+    let source = region
+        .as_ref()
+        .map_or(source, |within| within as &dyn RaySource);
+    let distance_mm = options.distance_mm.unwrap_or(working_distance_mm);
+    let lenses = || -> Result<Pinholes, Error> {
+        Ok(nearest_pinholes(
+            source,
+            distance_mm,
+            &options.lenses(form)?,
+        )?)
+    };
+    Ok(match form {
         FolderForm::OpenCv => {
-            let pinholes = pinholes(&[Distortion::Five, Distortion::Eight])?;
-            (opencv::files(&pinholes)?, pinholes)
+            let lenses = lenses()?;
+            Contents::of_lenses(opencv::files(&lenses)?, lenses)
         }
         FolderForm::Kalibr => {
-            let pinholes = pinholes(&[Distortion::Four])?;
-            (kalibr::files(&pinholes), pinholes)
+            let lenses = lenses()?;
+            Contents::of_lenses(kalibr::files(&lenses), lenses)
         }
         FolderForm::Ros => {
-            let pinholes = pinholes(&[Distortion::Five, Distortion::Eight])?;
-            (ros::files(&pinholes), pinholes)
+            let lenses = lenses()?;
+            Contents::of_lenses(ros::files(&lenses), lenses)
         }
-        FolderForm::Npy => return Ok((dense::files(source)?, None)),
+        FolderForm::Mrcal => {
+            let lenses = lenses()?;
+            Contents::of_lenses(mrcal::files(source, &lenses), lenses)
+        }
+        FolderForm::MrcalSplined => {
+            let splined = nearest_splined(source, distance_mm)?;
+            Contents {
+                files: mrcal::splined_files(source, &splined),
+                loss: Some(LossObject::of_splined(&splined)),
+                maps: splined
+                    .cameras
+                    .into_iter()
+                    .map(|camera| camera.map)
+                    .collect(),
+                ..Contents::default()
+            }
+        }
+        FolderForm::Remap => {
+            let maps = remap::maps(source, distance_mm)?;
+            Contents::of_views(remap::files(&maps)?, &maps, distance_mm)
+        }
+        FolderForm::Rectify => {
+            let pair = rectify::rectified(source, distance_mm)?;
+            Contents::of_views(pair.files()?, &pair.maps, distance_mm)
+        }
+        FolderForm::Undistort => undistorted(options, source, distance_mm)?,
+        FolderForm::Npy => Contents {
+            files: dense::files(source)?,
+            ..Contents::default()
+        },
+    })
+}
+
+fn undistorted(
+    options: &FolderArgs,
+    source: &dyn RaySource,
+    distance_mm: f64,
+) -> Result<Contents, Error> {
+    let folder = options.images.as_ref().ok_or(UsageError::NoImages)?;
+    let maps = remap::maps(source, distance_mm)?;
+    let images = undistort::images(folder, &maps)?;
+    let notes = match &images.passed_over[..] {
+        [] => Vec::new(),
+        files => vec![format!(
+            "passed over, as no PNG of a camera: {}",
+            files.join(", ")
+        )],
     };
-    Ok((files, Some(LossObject::new(&pinholes))))
+    Ok(Contents {
+        notes,
+        ..Contents::of_views(images.files, &maps, distance_mm)
+    })
 }
 
 /// Names make files: those of a dataset do, those of a file from anywhere may not.
-fn check_names(source: &dyn RaySource) -> Result<(), ExchangeError> {
+pub(super) fn check_names(source: &dyn RaySource) -> Result<(), ExchangeError> {
     let is_usable = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.');
     let mut cameras = source.cameras().into_iter();
     match cameras.find(|camera| !camera.name.chars().all(is_usable)) {

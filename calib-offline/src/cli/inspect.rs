@@ -85,6 +85,9 @@ struct DatasetObject {
     square_mm: f64,
     #[serde(skip)]
     board: String,
+    /// What its labels are, in one word.
+    #[serde(skip)]
+    points: &'static str,
     stage: bool,
     excluded: Vec<usize>,
     source: &'static str,
@@ -219,7 +222,8 @@ fn dataset_object(path: &Path) -> Result<DatasetObject, Error> {
         rows: dataset.board.rows,
         cols: dataset.board.cols,
         square_mm: dataset.board.square_mm,
-        board: dataset.board.words(),
+        board: dataset.board.words_of(dataset.kind.points()),
+        points: dataset.kind.points_in_a_word(),
         stage: dataset.stage.is_some(),
         excluded: dataset.excluded_poses.iter().copied().collect(),
         source,
@@ -279,10 +283,11 @@ fn dataset_words(object: &DatasetObject) -> String {
             });
         let _ = writeln!(
             words,
-            "{:<15} {} views, {} corners{per_view}, {:.0} % of the sensor would be calibrated",
+            "{:<15} {} views, {} {}{per_view}, {:.0} % of the sensor would be calibrated",
             camera.name,
             camera.views,
             camera.corners,
+            object.points,
             100.0 * camera.covered_share
         );
     }

@@ -5,6 +5,7 @@
 
 pub mod args;
 mod asked_for;
+pub mod audit;
 pub mod calibrate;
 pub mod compare;
 pub mod demo;
@@ -17,8 +18,16 @@ mod error_causes;
 pub mod evaluate;
 pub mod export;
 mod export_folder;
+mod export_form;
+mod export_help;
+mod export_loss;
+mod export_mesh;
+mod export_options;
 mod failure;
 pub mod flash;
+pub mod foreign_args;
+pub mod import;
+pub mod import_corners;
 pub mod inspect;
 mod lengths;
 pub mod match_noise;

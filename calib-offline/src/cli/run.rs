@@ -6,15 +6,28 @@ use super::outcome::Outcome;
 use super::output::Console;
 use super::settings::Settings;
 use super::{
-    calibrate, compare, demo, device, evaluate, export, failure, flash, inspect, measure, methods,
-    pack, rays, recording, target, verify,
+    audit, calibrate, compare, demo, device, evaluate, export, failure, flash, import, inspect,
+    measure, methods, pack, rays, recording, target, verify,
 };
-use clap::Parser;
+use clap::{Command, CommandFactory as _, FromArgMatches as _};
 use std::process::ExitCode;
+
+/// The command with options that take a number below zero as their value, and no option of its own: what is wrong with
+/// it the reader of the value says best.
+fn with_negative_numbers(command: Command) -> Command {
+    let command = command.mut_args(|arg| {
+        let takes_values = arg.get_action().takes_values();
+        arg.allow_negative_numbers(takes_values)
+    });
+    command.mut_subcommands(with_negative_numbers)
+}
 
 /// Runs the command that the process was started with.
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let parsed = with_negative_numbers(Cli::command())
+        .try_get_matches()
+        .and_then(|matches| Cli::from_arg_matches(&matches));
+    let cli = match parsed {
         Ok(cli) => cli,
         Err(error) => return failure::of_arguments(&error, std::env::args_os()),
     };
@@ -34,6 +47,7 @@ pub fn main() -> ExitCode {
 
 fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
     match verb {
+        Verb::Audit(args) => audit::run(args, console),
         Verb::Calibrate(args) => calibrate::run(args, console, &crate::pipeline::calibrate),
         Verb::Compare(args) => compare::run(args, console),
         Verb::Demo(args) => demo::run(args, console),
@@ -42,6 +56,7 @@ fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
         Verb::Evaluate(args) => evaluate::run(args, console),
         Verb::Export(args) => export::run(args, console),
         Verb::Flash(args) => flash::run(args, console),
+        Verb::Import(args) => import::run(args, console),
         Verb::Inspect(args) => inspect::run(args, console),
         Verb::Measure(args) => measure::run(args, console),
         Verb::Methods(args) => methods::run(args, console),

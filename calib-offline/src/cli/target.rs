@@ -27,7 +27,7 @@ const FORMATS: &str = "\
 Writes an SVG, or a PDF where the output's name ends so, at true size: print it at 100 %, without
 fitting it to the page, and measure it. Its [board] for dataset.toml goes to standard output, and to
 a file of the same name that ends in .toml. The keys of [board] are the options:
-  chessboard   rows, cols (inner corners), square_mm, marked (squares with a dot)
+  chessboard   rows, cols (inner corners), square_mm, square_height_mm, marked (squares with a dot)
   charuco      rows, cols (inner corners), square_mm, marker_mm, dictionary, legacy, first_id
   aprilgrid    rows, cols (tags), tag_mm, spacing, family [36h11], first_id, border_bits
   circles      rows, cols, pitch_mm, diameter_mm, asymmetric, direction
@@ -59,6 +59,9 @@ pub struct TargetArgs {
     /// Side of a square
     #[arg(long, value_name = "MM")]
     pub square_mm: Option<f64>,
+    /// Height of a chessboard's square along a column, where it is not its side along a row
+    #[arg(long, value_name = "MM")]
+    pub square_height_mm: Option<f64>,
     /// A square of a chessboard with a dot: from 0 at the upper left
     #[arg(long, value_name = "ROW:COL", value_parser = parse_place)]
     pub marked: Vec<(i64, i64)>,
@@ -204,6 +207,7 @@ fn board_text(args: &TargetArgs) -> String {
     line("rows", whole(args.rows));
     line("cols", whole(args.cols));
     line("square_mm", length(args.square_mm));
+    line("square_height_mm", length(args.square_height_mm));
     line("marker_mm", length(args.marker_mm));
     line("dictionary", word(&args.dictionary));
     line("legacy", flag(args.legacy));
@@ -237,11 +241,11 @@ fn artwork(kind: &BoardKind, board: &BoardSpec) -> Option<Artwork> {
     Some(match kind {
         BoardKind::Chessboard => {
             let size = (board.rows, board.cols);
-            chessboard::artwork(size, [board.square_mm; 2], &[])
+            chessboard::artwork(size, board.square_sides_mm(), &[])
         }
         BoardKind::MarkedChessboard(marked) => {
             let size = (board.rows, board.cols);
-            chessboard::artwork(size, [board.square_mm; 2], marked)
+            chessboard::artwork(size, board.square_sides_mm(), marked)
         }
         BoardKind::Charuco(board) => board.artwork(),
         BoardKind::AprilGrid(grid) => grid.artwork(TagOrder::Upwards),

@@ -97,6 +97,44 @@ pub enum UsageError {
     /// Two calibrations without a place in common.
     #[error("the calibrations have no calibrated pixels in common that see the same points")]
     NothingInCommon,
+    /// Rays that do not meet, and nobody says where they matter.
+    #[error(
+        "the rays of its cameras do not meet in a point, so that it matters how far away things are"
+    )]
+    NeedsDistance,
+    /// Cameras that are called otherwise in the dataset.
+    #[error("{calibration}: its cameras are {}, the dataset's {}", found.join(", "), wanted.join(", "))]
+    AuditCameras {
+        /// The calibration.
+        calibration: String,
+        /// Its cameras.
+        found: Vec<String>,
+        /// Those of the dataset.
+        wanted: Vec<String>,
+    },
+    /// Images of another size.
+    #[error("{calibration}: camera \"{camera}\" has {} x {} px, in the dataset {} x {}", found[0], found[1], wanted[0], wanted[1])]
+    AuditSensor {
+        /// The calibration.
+        calibration: String,
+        /// The camera.
+        camera: String,
+        /// Its size there.
+        found: [u32; 2],
+        /// In the dataset.
+        wanted: [u32; 2],
+    },
+    /// A lens that a format has no place for.
+    #[error("--model {lens}: the format has no place for it; it holds {}", held.join(", "))]
+    ExportLens {
+        /// The lens.
+        lens: &'static str,
+        /// Those that it holds.
+        held: Vec<&'static str>,
+    },
+    /// Images to undistort that nobody named.
+    #[error("--format undistort: which images are meant? --images is missing")]
+    NoImages,
     /// The input would be replaced by the output.
     #[error("{}: is what the command reads", path.display())]
     OutputIsInput {
@@ -136,7 +174,16 @@ impl Remedy for UsageError {
             Self::OtherCameras { .. } => {
                 "compare calibrations of one rig, with the same names and image sizes"
             }
+            Self::NeedsDistance => "say it with --distance-mm",
+            Self::AuditCameras { .. } => {
+                "name the cameras in the order of the calibration's files with --names A,B, as dataset.toml does"
+            }
+            Self::AuditSensor { .. } => {
+                "record with the resolution, binning and region of the calibration"
+            }
             Self::NothingInCommon => "look at both with calib-offline inspect",
+            Self::ExportLens { .. } => "take one that it holds; --format opencv holds all of them",
+            Self::NoImages => "give the folder of the images with --images FOLDER",
             Self::OutputIsInput { .. } => "choose another place with -o",
         };
         Some(text.to_owned())

@@ -145,6 +145,7 @@ mod tests {
         let pinhole = calibrate_rig(&seen, &RigSettings::default()).unwrap();
         let rig = pinhole.rig(&seen.numbered_cameras(), &seen).unwrap().rig;
         let whole = Fold {
+            joint: None,
             rig,
             board_shape: BoardShape::default(),
             unseen: seen.clone(),

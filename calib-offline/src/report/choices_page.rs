@@ -61,12 +61,15 @@ fn chosen(calibration: &Calibration, choices: &ChoicesRecord) -> Markup {
     html! {
         section {
             h2 { "Chosen by the data" }
-            p.read { strong { "How to read this. " } "Evidence is twice the logarithm of how probable a model makes the data: a more flexible model is taken if it gains more than " (NEEDED_GAIN) ", and kept as long as a simpler one loses more than that. Of the numbers that a model has, the data use as many as they determine; the others are held by smoothness." }
+            p.read { strong { "How to read this. " } "Evidence is twice the logarithm of how probable a model makes the data: a more flexible model is taken if it gains more than " (NEEDED_GAIN) ", and kept as long as a simpler one loses more than that. Of the numbers that a model has, the data use as many as they determine; the others are held by smoothness. Offsets and splines are also held against boards that no fold learned from: t is the mean change of their residuals in its own standard deviations, above 0 if the simpler model is worse; what they speak against beyond the limit is dropped." }
             dl {
                 @if calibration.board.layout.is_grid() {
                     dt { "Board's shape" } dd { (words::board(choices)) }
                 }
                 dt { "Noise" } dd { (words::noise(choices)) }
+                @if let Some(found) = &choices.unseen {
+                    dt { "Unseen boards" } dd { (words::model_choice(found)) }
+                }
             }
             div.figures {
                 div.scroll {

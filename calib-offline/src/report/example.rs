@@ -113,6 +113,7 @@ pub fn calibration() -> Calibration {
             date: None,
         }),
         task: Some(task()),
+        imported: None,
         alternating: None,
         held_out: Some(held_out()),
         verdict: Verdict {
@@ -215,6 +216,7 @@ fn choices() -> ChoicesRecord {
         precision: 1e6,
     };
     ChoicesRecord {
+        unseen: None,
         tried: vec![
             choice(Alternative::Offsets, 606.8, true),
             choice(Alternative::Spline { cells: 11.5 }, -2.2, false),

@@ -125,7 +125,7 @@ impl Facts {
             half_data_mm: halves.map(|halves| halves.difference_rms_mm),
             half_data_ratio: halves.map(|halves| halves.ratio),
             central_model_mm: checks.and_then(|checks| match checks.central_model {
-                CentralModel::IsCentral { .. } => Some(0.0),
+                CentralModel::IsCentral { .. } | CentralModel::Declared { .. } => Some(0.0),
                 CentralModel::Costs { points, .. } => points.map(|points| points.rms_mm),
                 CentralModel::NoEstimate => None,
             }),
@@ -162,7 +162,8 @@ impl Facts {
                 .into_iter()
                 .map(f64::to_degrees)
                 .collect(),
-            working_distance_mm: working_distance(calibration),
+            working_distance_mm: working_distance(calibration)
+                .or_else(|| said_distance(calibration)),
             poses_used: pose_count(calibration),
             views_used: views.len(),
             left_out: calibration.left_out.len(),
@@ -191,6 +192,16 @@ fn views(calibration: &Calibration) -> BTreeSet<(usize, usize)> {
 fn pose_count(calibration: &Calibration) -> usize {
     let poses: BTreeSet<usize> = calibration.poses.iter().map(|p| p.pose).collect();
     poses.len()
+}
+
+/// Of a calibration without boards: what was said when it was imported.
+fn said_distance(calibration: &Calibration) -> Option<Spread> {
+    let mm = calibration.imported.as_ref()?.working_distance_mm?;
+    Some(Spread {
+        least: mm,
+        median: mm,
+        most: mm,
+    })
 }
 
 /// From each camera to the middle of each board it saw.

@@ -228,6 +228,7 @@ mod tests {
             max_error_px: 0.00042,
             max_error_mm: 0.00017,
             wanted_error_px: 0.001,
+            search_ended_early: false,
             curve: vec![point(160, 0.7), point(672, 0.012), point(2400, 0.0004)],
         }
     }

@@ -5,6 +5,7 @@ mod causes_page;
 mod choices_page;
 pub mod facts;
 pub mod html;
+pub mod import;
 pub mod left_out_page;
 pub mod nearest_pinhole;
 pub mod plot;

@@ -20,7 +20,7 @@ pub struct NearestPinhole {
     pub focal_px: [f64; 2],
     /// The principal point `[cx, cy]`, px.
     pub principal_point_px: [f64; 2],
-    /// Coefficients in OpenCV's order.
+    /// Coefficients in `OpenCV`'s order.
     pub distortion: Vec<f64>,
     /// Where on the rays it was fitted, mm from the camera.
     pub distance_mm: f64,

@@ -6,6 +6,7 @@ use calib_estimate::alternating::spread::SpreadChoice;
 use calib_estimate::joint::{Choice, SmoothnessFound};
 pub use calib_judge::agreement::Agreement;
 pub use calib_judge::held_out::FailedFold;
+pub use calib_judge::model_choice::ModelChoice;
 pub use calib_judge::stage_axis::StageAxis;
 pub use calib_judge::verdict::{Grade, Verdict};
 pub use calib_judge::{Cause, CrossChecks, ExpectedError};
@@ -39,13 +40,13 @@ pub struct Calibration {
     /// what has no bearing on the result. `None` where a library was, and in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub command: Option<String>,
-    /// `joint` or `alternating`.
+    /// `joint` or `alternating`; `imported` of a calibration by another tool.
     pub method: String,
-    /// SHA-256 of the manifest and of the corners that went in, hex. With the tool's version it
-    /// identifies the calibration.
+    /// SHA-256 of the manifest and of the corners that went in, hex; of an imported calibration, of its files. With the
+    /// tool's version it identifies the calibration.
     pub input_sha256: String,
     /// The board as it was while it was recorded: as the manifest describes it, longer by what its
-    /// certificate says of its temperature.
+    /// certificate says of its temperature. Of an imported calibration nothing is known of a board: no rows, no columns.
     pub board: BoardSpec,
     /// What the manifest says of the board's lengths, if it does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -99,8 +100,39 @@ pub struct Calibration {
     /// The expected error of the measurement that was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub task: Option<ExpectedError>,
+    /// Where it came from, if another tool made it: then there are neither poses nor corners.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub imported: Option<ImportRecord>,
     /// The judgement.
     pub verdict: Verdict,
+}
+
+/// Where an imported calibration came from, and what was lost on the way.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ImportRecord {
+    /// The tool whose format it was.
+    pub format: String,
+    /// Names of the files.
+    pub files: Vec<String>,
+    /// In the rig's order.
+    pub cameras: Vec<ImportedCamera>,
+    /// Where things are measured, mm from the cameras, if somebody said so.
+    pub working_distance_mm: Option<f64>,
+    /// What was lost, in words.
+    pub lost: Vec<String>,
+}
+
+/// A camera of an imported calibration.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ImportedCamera {
+    /// Its name in the rig.
+    pub name: String,
+    /// The model's name in its tool.
+    pub model: String,
+    /// RMS difference of the ray field from the model over the calibrated area, px.
+    pub rms_px: f64,
+    /// The largest, px.
+    pub max_px: f64,
 }
 
 /// A camera as the manifest describes it.
@@ -212,6 +244,10 @@ pub struct ChoicesRecord {
     pub board_peak_to_valley_mm: f64,
     /// Its standard deviation, as far as the terms of the shape are independent, mm.
     pub board_peak_to_valley_sd_mm: f64,
+    /// What boards that no fold learned from say to offsets and splines; `None` without these, without folds, and in
+    /// files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unseen: Option<ModelChoice>,
 }
 
 /// How the published procedure went.

@@ -185,7 +185,8 @@ impl Calibration {
                 "the noise of matches is not 0 to 1000 px",
             ),
             (
-                self.board.rows > 0 && self.board.cols > 0 && self.board.square_mm > 0.0,
+                self.imported.is_some()
+                    || self.board.rows > 0 && self.board.cols > 0 && self.board.square_mm > 0.0,
                 "the board has no size",
             ),
         ];

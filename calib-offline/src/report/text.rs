@@ -2,16 +2,19 @@
 
 use super::BlobFacts;
 use super::facts::{Facts, pair};
+use super::import;
 use super::procedure;
 use super::record::{Calibration, Grade};
 use super::task;
 use super::words;
 use crate::present::numbers::short;
-use std::fmt::Write as _;
 
 /// A few lines, each with one fact and its unit; no colors.
 pub fn summary(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
     let facts = Facts::of(calibration);
+    if let Some(imported) = &calibration.imported {
+        return import::summary(imported, &facts);
+    }
     let mut lines: Vec<(&str, String)> = vec![("verdict", facts.verdict.word().to_owned())];
     lines.extend(facts.reasons.iter().map(|reason| ("", reason.clone())));
     lines.extend(causes(calibration));
@@ -99,11 +102,7 @@ pub fn summary(calibration: &Calibration, blob: Option<&BlobFacts>) -> String {
     if let Some(blob) = blob {
         lines.push(("blob", blob.in_words()));
     }
-    lines.iter().fold(String::new(), |mut text, (name, fact)| {
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "{name:<15} {fact}");
-        text
-    })
+    import::lined(&lines)
 }
 
 /// What was found about the recording; what lowers the grade stands among the reasons.

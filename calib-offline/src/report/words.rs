@@ -3,10 +3,11 @@
 use super::nearest_pinhole::NearestPinhole;
 use super::record::{Calibration, ChoicesRecord};
 use crate::present::numbers::short;
-use calib_estimate::joint::{Alternative, Choice, Family};
+use calib_estimate::joint::{Alternative, Choice, Family, Simpler};
 use calib_judge::central_model::CentralModel;
 use calib_judge::centrality::Centrality;
 use calib_judge::half_data::{HalfData, HalfDataCheck, Skipped};
+use calib_judge::model_choice::{Compared, ModelChoice};
 use calib_rays::field::structured::{OFFSET_CORE_DEGREE, PLAIN_DEGREE, TILT_DEGREE};
 
 /// How many numbers of a kind there are, and how many of them the data determine.
@@ -110,6 +111,22 @@ pub fn central_model(found: &CentralModel) -> String {
                 change(-evidence_loss)
             )
         }
+        CentralModel::Declared {
+            offsets_gain,
+            points,
+        } => {
+            let points = points.map_or(String::new(), |difference| {
+                format!(
+                    " and move points by {} mm RMS (most {})",
+                    short(difference.rms_mm),
+                    short(difference.max_mm)
+                )
+            });
+            format!(
+                "declared (optics = \"plain\"); offsets would change the evidence by {}{points}",
+                change(*offsets_gain)
+            )
+        }
         CentralModel::NoEstimate => "not known: without offsets there is no estimate".to_owned(),
     }
 }
@@ -122,6 +139,41 @@ pub fn nearest_pinhole(pinhole: &NearestPinhole) -> String {
         "nearest pinhole: focal lengths {fx:.2} and {fy:.2} px, principal point ({cx:.2}, {cy:.2}), {} px RMS from the rays (most {})",
         short(pinhole.rms_px),
         short(pinhole.max_px)
+    )
+}
+
+/// What unseen boards say to what the evidence chose.
+pub fn model_choice(found: &ModelChoice) -> String {
+    let compared: Vec<String> = found.compared.iter().map(simpler).collect();
+    format!(
+        "{} unseen boards: {} px RMS by what the evidence chose; {}",
+        found.boards,
+        short(found.rms_px),
+        compared.join("; ")
+    )
+}
+
+fn simpler(found: &Compared) -> String {
+    let without = match found.without {
+        Simpler::NoOffsets => "without offsets",
+        Simpler::NoSpline => "without splines",
+        Simpler::Neither => "without offsets and splines",
+        Simpler::Plain => "by plain lenses",
+    };
+    let judged = match (found.taken, found.t) {
+        (true, t) if t < -found.limit => "taken, as unseen boards are for it",
+        (true, _) => "taken, as its evidence is larger and unseen boards do not object",
+        (false, t) if t > found.limit => "worse",
+        (false, _) => "no better",
+    };
+    let evidence = found
+        .evidence_gain
+        .map_or(String::new(), |gain| format!(", evidence {}", change(gain)));
+    format!(
+        "{without} {} px, t = {:+.1} of {:.1}{evidence}: {judged}",
+        short(found.rms_px),
+        found.t,
+        found.limit
     )
 }
 

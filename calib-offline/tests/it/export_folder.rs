@@ -128,7 +128,7 @@ fn a_folder_with_results_is_replaced_only_if_asked() {
 fn forms_that_are_not_built_are_answered_with_those_that_are() {
     let folder = folder();
     let before = contents(folder.path());
-    for form in ["mrcal", "mesh-ti", "remap"] {
+    for form in ["mrcal-cahvor", "matlab", "dice"] {
         let export = ["export", "rig.rays", "--format", form, "-o", "out"];
         run(folder.path(), &export)
             .assert_code(2)

@@ -1,6 +1,7 @@
 //! Tests of the library and the program from outside, in one program.
 
 mod alternating;
+mod audit_command;
 mod bad_images;
 mod bad_input;
 mod bad_points;
@@ -15,10 +16,15 @@ mod examples;
 mod experiments;
 mod export_command;
 mod export_folder;
+mod export_mesh;
+mod export_out;
+mod import_command;
 mod joint_estimate;
+mod known_faults;
 mod lengths;
 mod match_noise;
 mod methods;
+mod model_choice;
 mod point_sigma;
 mod printed_targets;
 mod rays_command;

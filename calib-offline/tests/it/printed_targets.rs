@@ -252,6 +252,48 @@ fn a_chessboard_with_marked_squares_that_looks_the_same_after_a_turn() {
 }
 
 #[test]
+fn a_chessboard_with_squares_higher_than_wide() {
+    let art = chessboard::artwork((6, 9), [20.0, 21.0], &[]);
+    let options = [
+        "--kind",
+        "chessboard",
+        "--rows",
+        "6",
+        "--cols",
+        "9",
+        "--square-mm",
+        "20",
+        "--square-height-mm",
+        "21",
+    ];
+    let places = labelled((6, 9), |row, col| [20.0 * col as f64, 21.0 * row as f64]);
+    let home = found(&options, art, &places, 0.02);
+    calibrates(&home);
+    let inspected = run(home.path(), &["inspect", "."]);
+    inspected.assert_code(0);
+    assert!(
+        inspected.stdout.contains("20 x 21 mm"),
+        "{}",
+        inspected.stdout
+    );
+    // Described as square, the cause names the line that was left out.
+    let manifest = home.path().join("dataset.toml");
+    let text = fs::read_to_string(&manifest).unwrap();
+    fs::write(&manifest, text.replace("square_height_mm = 21.0\n", "")).unwrap();
+    let calibrated = run(home.path(), &["calibrate", ".", "-o", "square", "--json"]).json();
+    let causes = calibrated["causes"].as_array().unwrap();
+    let cause = causes
+        .iter()
+        .find(|cause| cause["cause"] == "square-scale-axis")
+        .unwrap_or_else(|| panic!("{calibrated:#}"));
+    let said = cause["text"].as_str().unwrap();
+    let height = said.split("square_height_mm = ").nth(1).unwrap();
+    let height: f64 = height.split(')').next().unwrap().parse().unwrap();
+    // The corners' noise leaves a ten-thousandth.
+    assert!((height - 21.0).abs() < 0.03, "{said}");
+}
+
+#[test]
 fn a_board_that_is_not_the_one_described_is_named() {
     let home = tempfile::tempdir().unwrap();
     let folder = home.path();
@@ -292,6 +334,48 @@ fn what_cannot_be_printed_is_refused() {
     refused(&["--kind", "charuco", "-o", "b.png"], ".svg or .pdf");
     refused(&["--kind", "checker", "-o", "b.svg"], "checker");
     refused(&["--kind", "points", "-o", "b.svg"], "no print");
+    let chessboard = [
+        "--kind",
+        "chessboard",
+        "-o",
+        "b.svg",
+        "--rows=5",
+        "--cols=7",
+    ];
+    let of_chessboard = |rest: &[&'static str]| [&chessboard[..], rest].concat();
+    refused(&of_chessboard(&["--square-mm", "-5"]), "-5");
+    refused(&of_chessboard(&["--square-mm", "-5"]), "negative");
+    refused(
+        &of_chessboard(&["--square-mm=20", "--square-height-mm", "-1"]),
+        "square_height_mm = -1",
+    );
+    refused(
+        &of_chessboard(&["--square-mm=20", "--marked=1:1", "--marked=4:6"]),
+        "after a turn by 180 degrees",
+    );
+    let circles = [
+        "--kind",
+        "circles",
+        "-o",
+        "b.svg",
+        "--cols=8",
+        "--pitch-mm=20",
+    ];
+    let of_circles = |rest: &[&'static str]| [&circles[..], rest, &["--diameter-mm=12"]].concat();
+    refused(
+        &of_circles(&["--rows=6", "--direction=1:1", "--direction=4:6"]),
+        "after a turn by 180 degrees",
+    );
+    refused(
+        &of_circles(&[
+            "--rows=8",
+            "--direction=0:0",
+            "--direction=0:7",
+            "--direction=7:0",
+            "--direction=7:7",
+        ]),
+        "after a turn by 90 degrees",
+    );
     let with =
         |rest: &[&'static str]| [&["--kind", "charuco", "-o", "b.svg", "--rows=5"], rest].concat();
     refused(&with(&["--cols=7", "--square-mm=20"]), "marker_mm");

@@ -69,7 +69,16 @@ fn from_a_recording_to_points() {
     let export = ["export", "new.rays", "-o", "rig.c", "--format", "c"];
     let exported = json(path, &export);
     let export = ["export", "new.rays", "-o", "opencv", "--format", "opencv"];
-    let exported = [exported, json(path, &export)];
+    let mesh = ["export", "new.rays", "-o", "ldc", "--format", "mesh-ti"];
+    let table = "id,x,y,z,gap,sigma_x,sigma_y,sigma_z,status\na,1,2,3,0,,,,ok\n";
+    fs::write(path.join("table.csv"), table).unwrap();
+    let clouds = ["export", "table.csv", "-o", "cloud.ply", "--format", "ply"];
+    let exported = [
+        exported,
+        json(path, &export),
+        json(path, &mesh),
+        json(path, &clouds),
+    ];
     assert_documented("export", "calib-offline/export/1", &exported, &[]);
     fs::write(path.join("pixels.csv"), "id,u,v\na,320,240\n").unwrap();
     let rays = ["rays", "new.rays", "pixels.csv", "--camera", "left"];

@@ -214,6 +214,7 @@ pub fn calibration() -> Calibration {
         certificate: None,
         recording: None,
         task: None,
+        imported: None,
         verdict: Verdict {
             grade: Grade::Pass,
             reasons: Vec::new(),
