@@ -1,13 +1,18 @@
 //! How near the points of each printed target come to the truth, how many are found, and whether any is
 //! taken for another: beside `OpenCV` on the same images.
 //!
-//! `cargo bench -p calib-offline --bench targets -- [KIND...] [--images N] [--from K] [--opencv PYTHON]`. Images are
+//! `cargo bench -p calib-offline --bench targets -- [KIND...] [--images N] [--from K] [--threads N] [--ids]
+//! [--opencv PYTHON]`. Images are
 //! rendered (blur 0.5 to 2 px, noise 1 to 10 levels, tilts of 0 to 60 degrees, wide lenses with
 //! barrel distortion, a fifth of them covered in part, a tenth without a target) and thrown away.
+//! `--ids` takes smaller images (640 x 480), many of them in the time of one, to look for points taken for others
+//! and for targets where there are none. `true/said` is the points' RMS against the standard deviations given with them.
 //! With `--opencv`, `opencv_targets.py` looks at the same images. Both figures are over the points that
 //! lie in view and are not covered; `both` is the RMS over the points that both found.
 
-use calib_rays::geometry::PixelPoint;
+use calib_rays::board::BoardSpec;
+use calib_rays::geometry::{PixelPoint, SensorSize};
+use calib_rays::observed::Corner;
 use calib_rays::print::{AprilGrid, Artwork, Charuco, Circles, Codes, TagBorder, TagOrder};
 use calib_recording::dataset::BoardKind;
 use calib_recording::dataset::image::GrayImage;
@@ -31,6 +36,7 @@ const CHUNK: u64 = 50;
 struct Target {
     name: &'static str,
     kind: BoardKind,
+    board: BoardSpec,
     art: Arc<Artwork>,
     points: Vec<((usize, usize), [f64; 2])>,
     /// What `OpenCV` is told.
@@ -66,6 +72,7 @@ fn charuco(name: &'static str, rows: usize, dictionary: &str, legacy: bool) -> T
         art: Arc::new(board.artwork()),
         points: grid(rows, 10, |row, col| [20.0 * col as f64, 20.0 * row as f64]),
         half_turns: None,
+        board: BoardSpec::chessboard(rows, 10, 20.0),
         opencv: format!("charuco {rows} 10 20 15 {dictionary} {}", u8::from(legacy)),
         kind: BoardKind::Charuco(board),
     }
@@ -86,6 +93,7 @@ fn april_grid(name: &'static str, order: TagOrder) -> Target {
         art: Arc::new(grid_of.artwork(order)),
         points: grid(10, 12, |row, col| grid_of.corner_mm(row, col)),
         half_turns: None,
+        board: BoardSpec::face(10, 12, |row, col| grid_of.corner_mm(row, col)),
         opencv: format!("aprilgrid 5 6 {}", u8::from(order == TagOrder::Upwards)),
         kind: BoardKind::AprilGrid(grid_of),
     }
@@ -111,6 +119,7 @@ fn circles(
         art: Arc::new(circles.artwork()),
         points: grid(rows, cols, |row, col| circles.center_mm(row, col)),
         half_turns: (!asymmetric && direction.is_empty()).then_some((rows, cols)),
+        board: BoardSpec::face(rows, cols, |row, col| circles.center_mm(row, col)),
         opencv: format!("circles {rows} {cols} {}", u8::from(asymmetric)),
         kind: BoardKind::Circles(circles),
     }
@@ -147,7 +156,7 @@ fn by_nearest(shot: &Shot, target: &Target, found: Found) -> Found {
     found
         .into_values()
         .filter_map(|pixel| {
-            let away = |truth: &&((usize, usize), PixelPoint)| truth.1.distance_px(pixel);
+            let away = |truth: &&((usize, usize), PixelPoint)| truth.1.distance_px(pixel.0);
             let nearest = truth.iter().min_by(|a, b| away(a).total_cmp(&away(b)))?;
             Some((nearest.0, pixel))
         })
@@ -161,7 +170,7 @@ fn as_truth(shot: &Shot, target: &Target, found: Found) -> Found {
     };
     let near = target.points.iter().filter(|(label, at_mm)| {
         let pixel = shot.pixel(*at_mm).zip(found.get(label));
-        pixel.is_some_and(|(truth, pixel)| truth.distance_px(*pixel) < WRONG_PX)
+        pixel.is_some_and(|(truth, pixel)| truth.distance_px(pixel.0) < WRONG_PX)
     });
     if 2 * near.count() >= found.len() {
         return found;
@@ -170,7 +179,8 @@ fn as_truth(shot: &Shot, target: &Target, found: Found) -> Found {
     found.into_iter().map(turned).collect()
 }
 
-type Found = BTreeMap<(usize, usize), PixelPoint>;
+/// Points by label, with the standard deviation that comes with them.
+type Found = BTreeMap<(usize, usize), (PixelPoint, Option<f64>)>;
 
 #[derive(Default)]
 struct Score {
@@ -181,6 +191,8 @@ struct Score {
     false_targets: usize,
     squared: f64,
     worst_px: f64,
+    /// Over the points with a standard deviation: squared errors, and squared deviations.
+    said: [f64; 2],
 }
 
 impl Score {
@@ -194,7 +206,7 @@ impl Score {
             let truth = shot.pixel(*at_mm);
             match (truth, found.get(label)) {
                 (Some(truth), Some(pixel)) => {
-                    let error = truth.distance_px(*pixel);
+                    let error = truth.distance_px(pixel.0);
                     if error > 0.15 && std::env::var_os("VERBOSE").is_some() {
                         let (blur, noise) = (shot.render.blur_px, shot.render.noise_levels);
                         let covered = shot.is_covered(truth, NEAR_COVER_PX);
@@ -209,6 +221,10 @@ impl Score {
                         self.found += 1;
                         self.squared += error * error / 2.0;
                         self.worst_px = self.worst_px.max(error);
+                        if let Some(sigma_px) = pixel.1 {
+                            self.said[0] += error * error / 2.0;
+                            self.said[1] += sigma_px * sigma_px;
+                        }
                     }
                 }
                 (None, Some(_)) => self.wrong += 1,
@@ -222,14 +238,19 @@ impl Score {
 
     fn row(&self, name: &str) {
         println!(
-            "{name:28} {:7} {:8} {:7} {:6} {:6}   {:8.4} {:8.3}",
+            "{name:28} {:7} {:8} {:7} {:6} {:6}   {:8.4} {:8.3} {}",
             self.images,
             self.found,
             self.missed,
             self.wrong,
             self.false_targets,
             (self.squared / self.found.max(1) as f64).sqrt(),
-            self.worst_px
+            self.worst_px,
+            if self.said[1] > 0.0 {
+                format!("{:9.2}", (self.said[0] / self.said[1]).sqrt())
+            } else {
+                String::new()
+            }
         );
     }
 }
@@ -278,11 +299,17 @@ fn look(target: &Target, settings: &ShotSettings, seed: u64, folder: Option<&Pat
             Err(_) => {}
         }
     }
-    let corners = result.map(|found| found.corners).unwrap_or_default();
-    let ours = corners
-        .into_iter()
-        .map(|c| ((c.row, c.col), c.pixel))
-        .collect();
+    let ours = result.map_or_else(
+        |_| Found::new(),
+        |found| {
+            let beyond_px = found.model_error_px(&target.board).unwrap_or(0.0);
+            let sigma_px = |c: &Corner| c.sigma_px.map(|sigma| sigma.hypot(beyond_px));
+            let corners = found.corners.iter();
+            corners
+                .map(|c| ((c.row, c.col), (c.pixel, sigma_px(c))))
+                .collect()
+        },
+    );
     Looked {
         ours: as_truth(&shot, target, ours),
         shot,
@@ -322,7 +349,7 @@ fn opencv(python: &str, target: &Target, folder: &Path) -> (BTreeMap<u64, Found>
             next().parse().expect("a column"),
         );
         let pixel = PixelPoint::new(next().parse().expect("u"), next().parse().expect("v"));
-        found.entry(seed).or_default().insert(label, pixel);
+        found.entry(seed).or_default().insert(label, (pixel, None));
     }
     (found, seconds)
 }
@@ -336,7 +363,7 @@ fn common(looked: &Looked, target: &Target, theirs: &Found) -> (usize, [f64; 2])
             looked.ours.get(label),
             theirs.get(label),
         ) {
-            let (a, b) = (truth.distance_px(*ours), truth.distance_px(*theirs));
+            let (a, b) = (truth.distance_px(ours.0), truth.distance_px(theirs.0));
             if a <= WRONG_PX && b <= WRONG_PX {
                 sum.0 += 1;
                 sum.1[0] += a * a / 2.0;
@@ -350,6 +377,7 @@ fn common(looked: &Looked, target: &Target, theirs: &Found) -> (usize, [f64; 2])
 fn main() {
     let mut kinds: Vec<String> = Vec::new();
     let (mut images, mut from, mut python) = (200_u64, 0_u64, None);
+    let mut settings = ShotSettings::default();
     let mut args = std::env::args().skip(1);
     while let Some(arg) = args.next() {
         match arg.as_str() {
@@ -362,15 +390,22 @@ fn main() {
             "--from" => {
                 from = args.next().and_then(|n| n.parse().ok()).expect("--from K");
             }
+            "--ids" => settings.sensor = SensorSize::new(640, 480),
+            "--threads" => {
+                let threads = args.next().and_then(|n| n.parse().ok());
+                rayon::ThreadPoolBuilder::new()
+                    .num_threads(threads.expect("--threads N"))
+                    .build_global()
+                    .expect("a pool");
+            }
             "--opencv" => python = Some(args.next().expect("--opencv PYTHON")),
             "--bench" => {}
             _ => kinds.push(arg),
         }
     }
-    let settings = ShotSettings::default();
     println!(
-        "{:28} {:>7} {:>8} {:>7} {:>6} {:>6}   {:>8} {:>8}",
-        "px per axis", "images", "points", "missed", "wrong", "false", "RMS", "worst"
+        "{:28} {:>7} {:>8} {:>7} {:>6} {:>6}   {:>8} {:>8} {:>9}",
+        "px per axis", "images", "points", "missed", "wrong", "false", "RMS", "worst", "true/said"
     );
     for target in targets() {
         if !kinds.is_empty() && !kinds.iter().any(|kind| kind == target.name) {
@@ -418,7 +453,12 @@ fn main() {
             }
         }
         ours.row(target.name);
-        if python.is_some() {
+        if python.is_none() {
+            println!(
+                "  {images} images, CPU {:.0} ms an image",
+                1e3 * time.as_secs_f64() / images as f64
+            );
+        } else {
             theirs.row("  OpenCV");
             let rms = both
                 .1

@@ -11,7 +11,7 @@ const FLOORS: [&[&str]; 5] = [
     &["present"],
     &["device", "report"],
     &["methods"],
-    &["pipeline", "compare", "demo"],
+    &["pipeline", "compare", "audit", "demo"],
     &["cli"],
 ];
 
@@ -33,7 +33,7 @@ const FINE: [&[&str]; 3] = [
 ];
 
 /// Packages with code of the product, at the top and one folder below it.
-// Raised to 16 when the formats of other tools, in and out, became a package.
+// exchange (the formats of other tools) and the Python wheel were the last two.
 const MOST_PACKAGES: usize = 16;
 
 /// What only tests the product.
