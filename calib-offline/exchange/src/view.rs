@@ -46,7 +46,7 @@ pub struct ViewMap {
     pub view: View,
     /// The camera's own sensor.
     pub camera_sensor: SensorSize,
-    /// u and v for each pixel, row by row; [`OUTSIDE`] where no ray goes.
+    /// u and v for each pixel, row by row; (-1, -1) where no ray goes.
     pub pixels: Vec<[f32; 2]>,
     /// By how much the view is off at half the distance and at twice that.
     pub loss: Loss,

@@ -79,7 +79,7 @@ impl FittedGrid {
         median(self.corners.values().map(|c| self.sigma_px(c, unknown_px)))
     }
 
-    /// The image of one square at a node; see [`CornerGuess::px_from_square`].
+    /// The image of one square at a node; see `CornerGuess::px_from_square`.
     pub fn px_from_square(&self, node: Node) -> Option<Matrix2<f64>> {
         px_from_square(&self.pixels(), node)
     }

@@ -354,9 +354,9 @@ fn printed_targets_are_read_with_their_places() {
     assert!(matches!(kind, BoardKind::Charuco(board) if board.marker_mm == 15.0015));
     assert_eq!(board.square_mm, 20.002);
     let (kind, _) = read(
-        "kind = \"chessboard\"\nrows = 5\ncols = 7\nsquare_mm = 20\nmarked = [[0, 0], [5, 7]]",
+        "kind = \"chessboard\"\nrows = 5\ncols = 7\nsquare_mm = 20\nmarked = [[0, 0], [5, 6]]",
     );
-    assert_eq!(kind, BoardKind::MarkedChessboard(vec![(0, 0), (5, 7)]));
+    assert_eq!(kind, BoardKind::MarkedChessboard(vec![(0, 0), (5, 6)]));
 }
 
 #[test]

@@ -100,7 +100,7 @@ mod tests {
             |size, is_blank: &dyn Fn(Label) -> Option<bool>| print_ends(size, &found, is_blank);
         assert!(ends((4, 6), &|_| Some(true)));
         assert!(!ends((4, 6), &|_| None));
-        assert!(!ends((4, 6), &|(_, col)| Some(col % 2 == 0)));
+        assert!(!ends((4, 6), &|(row, col)| Some((row + col) % 2 == 0)));
         // Column 0 is one more.
         assert!(ends((3, 6), &|(_, col)| Some(col == 0)));
         assert!(!ends((3, 6), &|(row, _)| Some(row == 3)));

@@ -99,7 +99,7 @@ pub fn locate(
 }
 
 /// The markers as they are printed, in pitches.
-pub(in crate::detect) fn printed(target: &TargetSpec) -> Markers {
+pub fn printed(target: &TargetSpec) -> Markers {
     Radii::of(target).markers(target)
 }
 

@@ -44,7 +44,7 @@ const MAX_SIZE: f64 = 1.12;
 const USUAL_RATIO: f64 = 0.45;
 
 /// All fitted candidates of the polarity that has more of them, for a target of `count` markers.
-pub(in crate::detect) fn fitted_candidates(
+pub fn fitted_candidates(
     image: &GrayImage,
     sought: Sought,
     count: usize,
@@ -79,7 +79,7 @@ pub(in crate::detect) fn fitted_candidates(
 }
 
 /// A ring as the search for neighbors sees it.
-pub(in crate::detect) fn node(ring: &FittedRing) -> Node {
+pub fn node(ring: &FittedRing) -> Node {
     Node {
         center: at(ring.pixel),
         shape: ring.shape,
@@ -87,16 +87,16 @@ pub(in crate::detect) fn node(ring: &FittedRing) -> Node {
 }
 
 /// A cell as a point.
-pub(in crate::detect) fn grid_point((col, row): (i64, i64)) -> Vector2<f64> {
+pub fn grid_point((col, row): (i64, i64)) -> Vector2<f64> {
     Vector2::new(col as f64, row as f64)
 }
 
 /// The cells without those that lie aside of a smooth map through all, and that map. If they are
 /// too few for one: how many there are.
-pub(in crate::detect) fn checked_cells(
-    rings: &[FittedRing],
-    mut cells: Cells,
-) -> Result<(Cells, LocalMap), usize> {
+///
+/// # Errors
+/// How many there are, if they are too few for a map.
+pub fn checked_cells(rings: &[FittedRing], mut cells: Cells) -> Result<(Cells, LocalMap), usize> {
     loop {
         let pairs: Vec<_> = cells
             .iter()
@@ -117,17 +117,14 @@ pub(in crate::detect) fn checked_cells(
 }
 
 /// Leaves out markers whose fit is much worse than most.
-pub(in crate::detect) fn leave_out_poor(labelled: &mut BTreeMap<Label, FittedRing>) {
+pub fn leave_out_poor(labelled: &mut BTreeMap<Label, FittedRing>) {
     if let Some(usual) = median(labelled.values().map(|ring| ring.residual_rms)) {
         labelled.retain(|_, ring| ring.residual_rms <= MAX_RESIDUAL_RATIO * usual);
     }
 }
 
 /// The map from the target's plane (pitches) through labelled markers.
-pub(in crate::detect) fn target_map(
-    markers: &Markers,
-    labelled: &BTreeMap<Label, FittedRing>,
-) -> Option<LocalMap> {
+pub fn target_map(markers: &Markers, labelled: &BTreeMap<Label, FittedRing>) -> Option<LocalMap> {
     let pairs: Vec<_> = labelled
         .iter()
         .filter_map(|(label, ring)| Some((markers.get(label)?.at, at(ring.pixel))))
@@ -136,7 +133,7 @@ pub(in crate::detect) fn target_map(
 }
 
 /// Looks for the markers that are still missing where the others say that they are.
-pub(in crate::detect) fn complete(
+pub fn complete(
     image: &GrayImage,
     markers: &Markers,
     reach: f64,
@@ -184,7 +181,7 @@ pub(in crate::detect) fn complete(
 }
 
 /// The markers fitted anew with what the map does to each edge, as often as asked for.
-pub(in crate::detect) fn corrected(
+pub fn corrected(
     image: &GrayImage,
     markers: &Markers,
     reach: f64,

@@ -30,7 +30,7 @@ pub use detection::TargetDetection;
 pub use error::TargetError;
 pub use join::{MarkerMatch, join_markers};
 pub use locate::locate;
-pub(in crate::detect) use locate::printed;
+pub use locate::printed;
 pub use located::{LabelledMarker, Located};
 pub use settings::TargetSettings;
 pub use verdict::{TargetFigures, TargetImage, TargetRefusal};

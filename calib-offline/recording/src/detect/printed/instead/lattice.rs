@@ -271,11 +271,7 @@ fn shifted_rows(
 }
 
 /// The diameter of most circles as a share of the lattice's step.
-pub(in crate::detect) fn measured_diameter(
-    rings: &[FittedRing],
-    cells: &Cells,
-    map: &LocalMap,
-) -> Option<f64> {
+pub fn measured_diameter(rings: &[FittedRing], cells: &Cells, map: &LocalMap) -> Option<f64> {
     let sizes = cells.iter().map(|(&i, &cell)| {
         let step_px = map.derivative(&grid_point(cell)).determinant().abs();
         2.0 * rings[i].mean_radius_px() / step_px.sqrt()

@@ -4,7 +4,7 @@
 //! the description says serves only to choose between the ways in which one print can be described.
 
 mod charuco;
-pub(in crate::detect) mod corners;
+pub mod corners;
 mod lattice;
 mod stated;
 mod tags;
@@ -13,18 +13,18 @@ use super::super::chessboard::{RawCorner, Size, parts_at};
 use super::super::seen_board::SeenBoard;
 use super::super::verdict::Refusal;
 use crate::dataset::image::GrayImage;
-pub(in crate::detect) use lattice::measured_diameter;
-pub(in crate::detect) use stated::Stated;
+pub use lattice::measured_diameter;
+pub use stated::Stated;
 pub(super) use tags::spacing_of;
 
 /// The refusal of an image that clearly shows another target; `None` if it does not.
-pub(in crate::detect) fn other(image: &GrayImage, stated: &Stated) -> Option<Refusal> {
+pub fn other(image: &GrayImage, stated: &Stated) -> Option<Refusal> {
     let seen = seen(image, stated)?;
     (!seen.may_be(&stated.board)).then(|| refusal(seen, stated))
 }
 
 /// The words of that refusal.
-pub(in crate::detect) fn refusal(seen: SeenBoard, stated: &Stated) -> Refusal {
+pub fn refusal(seen: SeenBoard, stated: &Stated) -> Refusal {
     Refusal::OtherBoard {
         stated: stated.words.clone(),
         seen,

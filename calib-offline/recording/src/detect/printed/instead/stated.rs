@@ -6,7 +6,7 @@ use calib_rays::print::{AprilGrid, Charuco, Circles};
 
 /// What the description says.
 #[derive(Debug, Clone)]
-pub(in crate::detect) struct Stated {
+pub struct Stated {
     /// In words.
     pub words: String,
     /// As it would be seen.
