@@ -57,6 +57,19 @@ pub(crate) enum Content {
     Extrinsics(RigidTransform),
 }
 
+impl Content {
+    /// Whether its format's lengths are meters, as its documents say: no unit is asked for.
+    pub(crate) fn is_in_meters(&self) -> bool {
+        match self {
+            Self::Cameras(held) => matches!(
+                held.format,
+                Format::Ros | Format::Kalibr | Format::Mrcal | Format::Colmap
+            ),
+            Self::Extrinsics(_) => false,
+        }
+    }
+}
+
 /// A camera of another tool.
 #[derive(Debug)]
 pub struct ForeignCamera {

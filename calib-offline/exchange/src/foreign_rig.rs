@@ -53,7 +53,7 @@ impl ForeignRig {
     }
 
     /// Reads files of several calibrations: a file that holds several cameras is one by itself, the others of one format
-    /// are one together.
+    /// are one together. A unit that some of them need is that of these alone: the others' is meters.
     ///
     /// # Errors
     /// [`ImportError`].
@@ -62,11 +62,28 @@ impl ForeignRig {
         options: &ReadOptions,
         naming: &Naming,
     ) -> Result<Vec<Self>, ImportError> {
-        let mut groups: Vec<Group<'_>> = Vec::new();
-        for file in files {
+        let read = |file: &PathBuf, options: &ReadOptions| {
             let bytes = std::fs::read(file)
                 .map_err(|error| Problem::Read(error.to_string()).in_file(file))?;
-            let held = content(file, &bytes, options)?;
+            content(file, &bytes, options)
+        };
+        let mut contents = files
+            .iter()
+            .map(|file| read(file, options))
+            .collect::<Result<Vec<_>, ImportError>>()?;
+        if !contents.iter().all(Content::is_in_meters) {
+            let in_meters = ReadOptions {
+                unit: None,
+                ..*options
+            };
+            for (file, held) in files.iter().zip(&mut contents) {
+                if held.is_in_meters() {
+                    *held = read(file, &in_meters)?;
+                }
+            }
+        }
+        let mut groups: Vec<Group<'_>> = Vec::new();
+        for (file, held) in files.iter().zip(contents) {
             let joins = match &held {
                 Content::Cameras(held) if held.cameras.len() > 1 => None,
                 Content::Cameras(held) => Some(held.format),

@@ -143,9 +143,10 @@ fn points(candidate: &Candidate, seen: &Observations) -> Option<PointFigures> {
     let count = boards.neighbor_errors.len().max(1) as f64;
     let scale = boards.neighbor_errors.iter().sum::<f64>() / count;
     let neighbor = record::rms(&boards.neighbor_errors);
-    (boards.point_count > 0).then(|| PointFigures {
+    let unanswered = boards.outside_count + boards.unmet_count;
+    (boards.point_count + unanswered > 0).then(|| PointFigures {
         points: boards.point_count,
-        unanswered: boards.outside_count + boards.unmet_count,
+        unanswered,
         neighbor_rms_mm: neighbor.map(|share| share * seen.board.square_mm),
         scale_percent: neighbor.map(|_| 100.0 * scale),
         rigid_rms_mm: record::rms(&boards.rigid_errors_mm),

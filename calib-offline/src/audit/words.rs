@@ -39,7 +39,16 @@ fn of_one(calibration: &Audited, audit: &Audit) -> Vec<String> {
             "{title} was made from these very corners: its figures are fitted ones."
         ));
     }
-    if let Some(against) = &calibration.against_ours {
+    let sees_nothing = calibration
+        .points
+        .as_ref()
+        .filter(|points| points.points == 0 && points.unanswered > 0);
+    if let Some(points) = sees_nothing {
+        said.push(format!(
+            "{title} gives no point for any of {} corners that two cameras saw: with it they lie behind the cameras. Are the cameras' files in the wrong order, or R and T the other way round?",
+            points.unanswered
+        ));
+    } else if let Some(against) = &calibration.against_ours {
         said.push(compared(title, against));
     }
     if let Some(points) = &calibration.points

@@ -12,7 +12,7 @@ pub struct ForeignArgs {
         long,
         value_name = "UNIT",
         value_enum,
-        help = "The unit of the files' lengths, where they do not say it (OpenCV, DICe, MATLAB); else instead of meters"
+        help = "The unit of the files' lengths, where they do not say it (OpenCV, DICe, MATLAB); if no file needs it, instead of meters"
     )]
     pub unit: Option<UnitArg>,
     /// The size of the images, where the files do not say it

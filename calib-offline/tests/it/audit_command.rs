@@ -141,3 +141,38 @@ fn cameras_of_other_names_and_sizes_are_refused() {
         .assert_code(2)
         .assert_says(&["800 x 480", "640 x 480"]);
 }
+
+#[test]
+fn exchanged_files_are_no_match_for_ours_and_a_unit_is_that_of_the_files_that_need_it() {
+    let folder = folder();
+    let path = folder.path();
+    // The second camera's file first: with these R and T every corner lies behind the cameras.
+    let exchanged = ["audit", "right.yml", "left.yml", "extrinsics.yml", "set"];
+    let found = run(
+        path,
+        &[&exchanged[..], &["--unit", "mm", "--json"]].concat(),
+    );
+    let found = found.assert_code(0).json();
+    assert_eq!(found["calibrations"][0]["points"]["points"], 0);
+    let conclusion = found["conclusion"].to_string();
+    assert!(conclusion.contains("wrong order"), "{conclusion}");
+    assert!(!conclusion.contains("as good as"), "{conclusion}");
+
+    // The same cameras once more, in meters.
+    let own = ["left.yml", "right.yml", "extrinsics.yml"];
+    let unit = ["--unit", "mm"];
+    let import = [&["import"], &own[..], &unit, &["-o", "own.json"]].concat();
+    run(path, &import).assert_code(0);
+    let export = ["export", "own.json", "-o", "kalibr", "--format", "kalibr"];
+    run(path, &export).assert_code(0);
+    let rest = ["kalibr/camchain.yaml", "set", "--json"];
+    let names = ["--names", "left,right"];
+    let both = [&["audit"], &own[..], &rest, &unit, &names].concat();
+    let found = run(path, &both).assert_code(0).json();
+    for calibration in found["calibrations"].as_array().unwrap() {
+        let scale = calibration["points"]["scale_percent"].as_f64().unwrap();
+        // In millimeters taken for meters it is 1e5.
+        assert!(scale.abs() < 1.0, "{scale}");
+    }
+    assert_eq!(found["calibrations"].as_array().unwrap().len(), 2);
+}

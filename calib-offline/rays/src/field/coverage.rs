@@ -66,9 +66,14 @@ impl CoverageMask {
         if !self.sensor.contains(pixel) {
             return None;
         }
-        let (width_px, height_px) = self.cell_size_px();
-        let i = (((pixel.u + 0.5) / width_px) as usize).min(self.cells_u - 1);
-        let j = (((pixel.v + 0.5) / height_px) as usize).min(self.cells_v - 1);
+        // The product of a pixel is exact, and so is the quotient where a border between cells meets one: by the
+        // width of a cell, which is rounded, some borders fell to the cell before, and on the device to the cell behind.
+        let cell = |x: f64, cells: usize, extent: u32| {
+            let cell = (x + 0.5) * cells as f64 / f64::from(extent);
+            (cell as usize).min(cells - 1)
+        };
+        let i = cell(pixel.u, self.cells_u, self.sensor.width);
+        let j = cell(pixel.v, self.cells_v, self.sensor.height);
         Some(j * self.cells_u + i)
     }
 
@@ -119,6 +124,30 @@ fn rectangle_touches_hull([u0, v0, u1, v1]: [f64; 4], hull: &[PixelPoint]) -> bo
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn borders_between_cells_belong_to_the_cell_behind_whatever_the_size() {
+        for (width, height) in [
+            (800, 600),
+            (1600, 1200),
+            (640, 480),
+            (801, 601),
+            (5472, 3648),
+        ] {
+            let mask = CoverageMask::uniform(SensorSize::new(width, height), true);
+            // Quarter pixels from the sensor's edge, in whole numbers.
+            for quarter in 0..4 * width as usize {
+                let exact = quarter * mask.cells_u / (4 * width as usize);
+                let pixel = PixelPoint::new(quarter as f64 / 4.0 - 0.5, 0.0);
+                assert_eq!(mask.cell_of(pixel), Some(exact), "{width}: {pixel:?}");
+            }
+            for quarter in 0..4 * height as usize {
+                let exact = quarter * mask.cells_v / (4 * height as usize) * mask.cells_u;
+                let pixel = PixelPoint::new(0.0, quarter as f64 / 4.0 - 0.5);
+                assert_eq!(mask.cell_of(pixel), Some(exact), "{height}: {pixel:?}");
+            }
+        }
+    }
 
     #[test]
     fn everything_inside_the_hull_is_answered_and_far_outside_is_not() {
