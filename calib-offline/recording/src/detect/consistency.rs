@@ -130,6 +130,7 @@ pub fn settle(
 ) -> Result<Vec<(UnsettledView, Option<Placement>)>, ConsistencyError> {
     keep_right_colors(board, &mut views);
     let mut work = Settling {
+        board,
         stage,
         camera_names,
         chosen: vec![None; views.len()],
@@ -177,6 +178,7 @@ fn keep_right_colors(board: &BoardSpec, views: &mut [UnsettledView]) {
 }
 
 struct Settling<'a> {
+    board: &'a BoardSpec,
     camera_names: &'a [&'a str],
     stage: Option<&'a StageSpec>,
     views: Vec<UnsettledView>,
@@ -184,16 +186,16 @@ struct Settling<'a> {
 }
 
 impl Settling<'_> {
-    /// Views of a camera in which only the turn is open: at most one placement for each.
+    /// Views of a camera in which only the numbering is open: their placements are turns of one another.
     fn only_turn_open(&self, camera_idx: usize) -> Vec<usize> {
         let mut found: Vec<usize> = (0..self.views.len())
             .filter(|&k| {
                 let view = &self.views[k];
-                let mut turns: Vec<u8> = view.placements.iter().map(|p| p.quarter_turns).collect();
-                turns.sort_unstable();
-                turns.dedup();
-                let distinct = turns.len() == view.placements.len();
-                view.camera_idx == camera_idx && distinct && !turns.is_empty()
+                let is_one_place = view.placements.first().is_some_and(|first| {
+                    let mut all = view.placements.iter();
+                    all.all(|p| p.is_turn_of(first, self.board))
+                });
+                view.camera_idx == camera_idx && is_one_place
             })
             .collect();
         found.sort_unstable_by_key(|&k| self.views[k].pose);

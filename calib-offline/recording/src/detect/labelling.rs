@@ -37,6 +37,24 @@ impl Placement {
             && (0..board.rows as i32).contains(&(y + self.row_shift))
     }
 
+    /// Whether this is another placement after a turn that maps the board's corners onto themselves: which of the two is
+    /// taken is then a matter of numbering alone. Other placements put the grid on another part of the board.
+    pub fn is_turn_of(&self, other: &Self, board: &BoardSpec) -> bool {
+        let (cols, rows) = (board.cols as i32, board.rows as i32);
+        let quarter_turns = (self.quarter_turns + 4 - other.quarter_turns % 4) % 4;
+        if quarter_turns % 2 == 1 && rows != cols {
+            return false;
+        }
+        let (x, y) = turned((other.col_shift, other.row_shift), quarter_turns);
+        let (dx, dy) = match quarter_turns {
+            0 => (0, 0),
+            1 => (0, cols - 1),
+            2 => (cols - 1, rows - 1),
+            _ => (rows - 1, 0),
+        };
+        (self.col_shift, self.row_shift) == (x + dx, y + dy)
+    }
+
     /// Whether the square before corner (0, 0) of the board, towards negative x and y, is dark.
     pub fn dark_before_first_corner(&self, grid: &FittedGrid) -> bool {
         let steps = self.col_shift + self.row_shift + i32::from(self.quarter_turns);
@@ -107,4 +125,35 @@ pub fn fixed_color(board: &BoardSpec) -> Option<bool> {
     let turn_changes_it =
         !board.looks_same_after_half_turn() || (board.rows == board.cols && board.rows % 2 == 1);
     turn_changes_it.then_some(true)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn turns_of_the_board_are_told_from_other_parts_of_it() {
+        let placement = |quarter_turns, col_shift, row_shift| Placement {
+            quarter_turns,
+            col_shift,
+            row_shift,
+        };
+        // A board of 6 x 8 seen whole, from either end.
+        let board = BoardSpec::chessboard(6, 8, 10.0);
+        let (whole, other_end) = (placement(0, 0, 0), placement(2, 7, 5));
+        assert!(other_end.is_turn_of(&whole, &board) && whole.is_turn_of(&other_end, &board));
+        for node in [(0, 0), (7, 0), (3, 5)] {
+            let (x, y) = whole.place(node);
+            assert_eq!(other_end.place(node), (7 - x, 5 - y));
+        }
+        // Seven of its eight columns, from one end or from the other: two parts of the board.
+        assert!(!placement(2, 6, 5).is_turn_of(&whole, &board));
+        assert!(placement(2, 6, 5).is_turn_of(&placement(0, 1, 0), &board));
+        assert!(!placement(1, 0, 7).is_turn_of(&whole, &board));
+        // A square one looks alike from four sides.
+        let square = BoardSpec::chessboard(6, 6, 10.0);
+        for turn in [placement(1, 0, 5), placement(2, 5, 5), placement(3, 5, 0)] {
+            assert!(turn.is_turn_of(&whole, &square) && whole.is_turn_of(&turn, &square));
+        }
+    }
 }
