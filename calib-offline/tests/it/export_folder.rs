@@ -43,13 +43,15 @@ fn lists(path: &Path) -> BTreeMap<String, Vec<f64>> {
     found
 }
 
-/// How far off the numbers of an ideal camera may be. Coefficients have the same bound, which is wide: they take each
-/// other's place.
+/// How far off the numbers of an ideal camera may be, whose pixels are off by so much. Coefficients have the same bound,
+/// which is wide: they take each other's place. To move the principal point is all but to turn the camera: of a shift d
+/// there remain d x^2 beside the turn, a quarter of it at the edge of this sensor and a tenth on the average.
 fn assert_ideal(camera_matrix: &[f64], coefficients: &[f64], most_px: f64) {
     let center = SENSOR.center();
     let truth = [600.0, 0.0, center.u, 0.0, 600.0, center.v, 0.0, 0.0, 1.0];
-    for (found, truth) in camera_matrix.iter().zip(truth) {
-        assert!((found - truth).abs() < most_px, "{camera_matrix:?}");
+    for (k, (found, truth)) in camera_matrix.iter().zip(truth).enumerate() {
+        let most = if k % 3 == 2 { 10.0 * most_px } else { most_px };
+        assert!((found - truth).abs() < most, "{camera_matrix:?}");
     }
     assert!(
         coefficients.iter().all(|k| k.abs() < most_px),
@@ -100,7 +102,7 @@ fn opencv_reads_the_pinholes_and_where_they_stand() {
         }
         let lists = lists(&path.join(out).join("extrinsics.yml"));
         let turned = so3::log(&(Matrix3::from_row_slice(&lists["R"]) * rotation.transpose()));
-        assert!(turned.norm() < most_px / 600.0, "{turned}");
+        assert!(turned.norm() < 10.0 * most_px / 600.0, "{turned}");
         let moved_mm = Vector3::from_column_slice(&lists["T"]) - translation_mm;
         assert!(moved_mm.norm() < most_mm, "{moved_mm}");
     }
