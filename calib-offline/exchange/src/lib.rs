@@ -43,6 +43,7 @@ mod region;
 pub mod remap;
 mod rig;
 pub mod ros;
+mod sight;
 mod splined_fit;
 #[cfg(test)]
 mod tests;

@@ -1,24 +1,20 @@
-//! Points to pixels by the rays of a camera, for which there is no formula: the nearest lens has the place and the slope to
-//! start with, then each step halves what is left many times over.
+//! Points to pixels by the rays of a camera, for which there is no formula: the nearest lens has the place to start with,
+//! `sight` the search.
 
 use super::camera_rays::CameraRays;
 use super::distortion::Distortion;
 use super::error::ExchangeError;
 use super::nearest::{CameraPinhole, nearest};
+use super::sight::{Sight, Target};
 use calib_blob::rays::{RaySource, SourceCamera};
 use calib_rays::geometry::{PixelPoint, RigidTransform};
 use nalgebra::Vector3;
-
-/// A step that is shorter is the last, px ...
-const STILL_PX: f64 = 1e-6;
-/// ... and so is the last of these, if it is no longer than that: the rays of a blob come in steps of f32.
-const STEPS: usize = 20;
-const NEAR_PX: f64 = 1e-3;
 
 /// A camera that sees points by its rays.
 pub(super) struct Projector<'a> {
     source: &'a dyn RaySource,
     camera_idx: usize,
+    sight: Sight<'a>,
     /// The lens that comes nearest.
     pub lens: CameraPinhole,
     lens_from_rig: RigidTransform,
@@ -42,6 +38,7 @@ impl<'a> Projector<'a> {
         Ok(Self {
             source,
             camera_idx,
+            sight: Sight::new(source, camera_idx, camera.sensor),
             lens,
             lens_from_rig,
         })
@@ -49,29 +46,14 @@ impl<'a> Projector<'a> {
 
     /// The pixel whose ray passes through a point of the rig's frame; `None` where none of the calibrated area does.
     pub fn pixel(&self, point_in_rig: &Vector3<f64>) -> Option<PixelPoint> {
-        let seen = self
+        let guess = self
             .lens
             .lens
             .see(&self.lens_from_rig.point(point_in_rig))?;
-        let by_point = seen.by_point * self.lens_from_rig.rotation;
-        let mut pixel = seen.pixel;
-        let mut step_px = f64::INFINITY;
-        for _ in 0..STEPS {
-            let ray = self.source.ray(self.camera_idx, pixel)?;
-            let to_point = point_in_rig - ray.origin_mm;
-            let along_mm = to_point.dot(&ray.direction);
-            // Written so that NaN is refused.
-            if !(along_mm > 0.0) {
-                return None;
-            }
-            let step = by_point * (to_point - ray.direction * along_mm);
-            pixel = PixelPoint::new(pixel.u + step.x, pixel.v + step.y);
-            step_px = step.norm();
-            if step_px < STILL_PX {
-                break;
-            }
-        }
-        (step_px < NEAR_PX && self.source.ray(self.camera_idx, pixel).is_some()).then_some(pixel)
+        let center_mm = self.lens.rig_from_pinhole.translation_mm;
+        let target = Target::new(*point_in_rig, &center_mm);
+        let seen = self.sight.seen(&target, Some(guess.pixel), None)?;
+        Some(seen.pixel)
     }
 
     /// The point that a pixel sees on a plane of another frame, in that frame, mm; `None` where it sees none of it.

@@ -137,7 +137,7 @@ pub fn rectified(source: &dyn RaySource, distance_mm: f64) -> Result<Rectified, 
 
 /// The axes of a pair in the rig's frame, and whether its cameras stand side by side and not one above the other. `None` where they look apart or along
 /// the line between them.
-fn pair_axes(places: &[RigidTransform; 2]) -> Option<(Matrix3<f64>, bool)> {
+pub(super) fn pair_axes(places: &[RigidTransform; 2]) -> Option<(Matrix3<f64>, bool)> {
     let mean = |axis: usize| places[0].rotation.column(axis) + places[1].rotation.column(axis);
     let between = places[1].translation_mm - places[0].translation_mm;
     let is_side_by_side = between.dot(&mean(0)).abs() >= between.dot(&mean(1)).abs();

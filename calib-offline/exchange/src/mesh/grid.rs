@@ -1,11 +1,10 @@
 //! The nodes of a mesh: where the camera sees what the output image has there, and what a chip makes of the places between.
 
-use super::sight::{Sight, Target};
 use super::straight::filled;
 use super::view::View;
+use crate::sight::{Sight, Target};
 use calib_rays::geometry::PixelPoint;
-use calib_rays::in_order::try_map;
-use std::convert::Infallible;
+use rayon::prelude::*;
 
 /// What a chip does between nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,11 +56,11 @@ impl Grid {
     /// The nodes' true places; `None` if none is seen.
     pub fn new(sight: &Sight<'_>, view: &View, layout: Layout, distance_mm: f64) -> Option<Self> {
         let from_mm = view.rig_from_view.translation_mm;
-        let row = |v: u32| -> Result<Vec<Option<[f64; 2]>>, Infallible> {
+        let row = |v: &u32| -> Vec<Option<[f64; 2]>> {
             let mut before: [Option<PixelPoint>; 2] = [None; 2];
             let mut slope = None;
             let nodes = layout.us.iter().map(|u| {
-                let point_mm = view.point_mm([f64::from(*u), f64::from(v)], distance_mm);
+                let point_mm = view.point_mm([f64::from(*u), f64::from(*v)], distance_mm);
                 let near = match before {
                     [Some(last), Some(other)] => Some(PixelPoint::new(
                         2.0 * last.u - other.u,
@@ -74,12 +73,10 @@ impl Grid {
                 slope = seen.map(|seen| seen.slope).or(slope);
                 seen.map(|seen| [seen.pixel.u, seen.pixel.v])
             });
-            Ok(nodes.collect())
+            nodes.collect()
         };
-        let rows = match try_map(0..layout.vs.len(), |j| row(layout.vs[j])) {
-            Ok(rows) => rows.concat(),
-            Err(never) => match never {},
-        };
+        let rows: Vec<_> = layout.vs.par_iter().map(row).collect();
+        let rows = rows.concat();
         let at_px = filled(&rows, &layout.us, &layout.vs)?;
         Some(Self {
             layout,

@@ -1,13 +1,12 @@
 //! What the use of a mesh loses, at every pixel of the output image.
 
 use super::grid::Grid;
-use super::sight::{Seen, Sight, Target};
 use super::view::View;
 use crate::loss::Loss;
+use crate::sight::{Seen, Sight, Target};
 use calib_rays::geometry::PixelPoint;
-use calib_rays::in_order::try_map;
 use nalgebra::Vector2;
-use std::convert::Infallible;
+use rayon::prelude::*;
 
 /// The loss of a mesh, and the pixels of the output image that it was not taken at: no calibrated pixel sees what they show.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,11 +28,10 @@ struct Row {
 /// Every pixel of the output image: where the chip takes it from, rounded at its worst, against the pixel that sees what it shows; and
 /// how far beside that point the chip's pixel looks, mm, to first order. `None` if no pixel is seen. Cost: some four lookups a pixel.
 pub(super) fn lost(sight: &Sight<'_>, view: &View, grid: &Grid, distance_mm: f64) -> Option<Lost> {
-    let row = |v: u32| -> Result<Row, Infallible> { Ok(row(sight, view, grid, distance_mm, v)) };
-    let rows = match try_map(0..view.size.height, row) {
-        Ok(rows) => rows,
-        Err(never) => match never {},
-    };
+    let rows: Vec<Row> = (0..view.size.height)
+        .into_par_iter()
+        .map(|v| row(sight, view, grid, distance_mm, v))
+        .collect();
     let count: usize = rows.iter().map(|row| row.count).sum();
     let rms = |of: fn(&Row) -> f64| (rows.iter().map(of).sum::<f64>() / count as f64).sqrt();
     let max = |of: fn(&Row) -> f64| rows.iter().map(of).fold(0.0, f64::max);

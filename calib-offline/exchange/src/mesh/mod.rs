@@ -14,7 +14,6 @@ mod grid;
 mod lost;
 mod luxonis;
 mod plain;
-mod sight;
 mod straight;
 #[cfg(test)]
 mod tests;
@@ -27,11 +26,11 @@ pub use view::View;
 
 use crate::NamedFile;
 use crate::loss::Loss;
+use crate::sight::Sight;
 use calib_blob::rays::{RaySource, SourceCamera};
 use format::{Camera, Format};
 use grid::Grid;
 use serde_json::{Value, json};
-use sight::Sight;
 
 /// The JSON beside the meshes.
 pub const INDEX: &str = "mesh.json";

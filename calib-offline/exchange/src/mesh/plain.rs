@@ -6,6 +6,7 @@
 use super::error::MeshError;
 use super::format::{Camera, Format};
 use super::grid::{Grid, Layout};
+use crate::npy;
 use serde_json::{Value, json};
 
 pub(super) const FORMAT: Format = Format {
@@ -32,21 +33,10 @@ fn layout(camera: &Camera<'_>, step: u32) -> Result<Layout, MeshError> {
 }
 
 fn bytes(grid: &Grid) -> Vec<u8> {
-    let shape = [grid.layout.vs.len(), grid.layout.us.len()];
-    let mut header = format!(
-        "{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, {}, 2), }}",
-        shape[0], shape[1]
-    );
-    // Magic, version and length take 10 bytes; numbers begin at a multiple of 64.
-    while (10 + header.len() + 1) % 64 != 0 {
-        header.push(' ');
-    }
-    header.push('\n');
-    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-    bytes.extend((header.len() as u16).to_le_bytes());
-    bytes.extend(header.as_bytes());
-    bytes.extend(grid.at_px.iter().flatten().flat_map(|x| x.to_le_bytes()));
-    bytes
+    let shape = [grid.layout.vs.len(), grid.layout.us.len(), 2];
+    let numbers = grid.at_px.iter().flatten();
+    let bytes: Vec<u8> = numbers.flat_map(|x| x.to_le_bytes()).collect();
+    npy::file("<f8", &shape, &bytes)
 }
 
 fn facts(grid: &Grid) -> Value {

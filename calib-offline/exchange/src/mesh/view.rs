@@ -1,18 +1,18 @@
 //! The image that a mesh makes: that of a pinhole without distortion.
 
 use super::error::MeshError;
+use crate::camera_rays::CameraRays;
 use crate::distortion::Distortion;
 use crate::nearest::nearest_pinholes;
+use crate::rectify::pair_axes;
 use calib_blob::rays::RaySource;
 use calib_rays::geometry::{PixelPoint, RigidTransform, SensorSize};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 /// Places along the longer side of the sensor at which a view is fitted.
 const PLACES: u32 = 49;
 /// What lies farther off the axis than this many times its depth is not fitted to: a pinhole hardly shows it.
 const WIDEST: f64 = 4.0;
-/// Cameras stand side by side if the line between them is nearer to a row of their images than this, as a cosine.
-const SIDE_BY_SIDE: f64 = 0.7;
 
 /// An image without distortion. The center of its top-left pixel is (0, 0).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,19 +73,9 @@ pub(super) fn rectified(source: &dyn RaySource, distance_mm: f64) -> Result<[Vie
     let [first, second] = views[..] else {
         return Err(MeshError::NoPair);
     };
-    let between = second.rig_from_view.translation_mm - first.rig_from_view.translation_mm;
-    let mean = |axis: usize| -> Vector3<f64> {
-        first.rig_from_view.rotation.column(axis) + second.rig_from_view.rotation.column(axis)
-    };
-    let along = between.normalize();
-    let cosine = along.dot(&mean(0).normalize());
-    // NaN is no pair either.
-    if !(cosine.abs() > SIDE_BY_SIDE) {
+    let Some((rotation, true)) = pair_axes(&[first.rig_from_view, second.rig_from_view]) else {
         return Err(MeshError::NoPair);
-    }
-    let x = along * cosine.signum();
-    let y = mean(2).cross(&x).normalize();
-    let rotation = Matrix3::from_columns(&[x, y, x.cross(&y)]);
+    };
     let turned = [first, second].map(|view| View {
         rig_from_view: RigidTransform::new(rotation, view.rig_from_view.translation_mm),
         ..view
@@ -102,18 +92,14 @@ pub(super) fn rectified(source: &dyn RaySource, distance_mm: f64) -> Result<[Vie
 
 /// With the focal lengths and the principal point that come nearest; as it was where too little is seen.
 fn fitted(source: &dyn RaySource, camera_idx: usize, distance_mm: f64, view: View) -> View {
-    let view_from_rig = view.rig_from_view.inverse();
-    let SensorSize { width, height } = view.size;
-    let spacing_px = f64::from(width.max(height) - 1).max(1.0) / f64::from(PLACES - 1);
-    let along = |length: u32| {
-        let count = (f64::from(length - 1) / spacing_px).round().max(1.0);
-        (0..=count as u32).map(move |k| f64::from(k) / count * f64::from(length - 1))
-    };
-    let seen: Vec<(PixelPoint, Vector3<f64>)> = along(height)
-        .flat_map(|v| along(width).map(move |u| PixelPoint::new(u, v)))
-        .filter_map(|pixel| {
-            let ray = source.ray(camera_idx, pixel)?;
-            let point = view_from_rig.point(&(ray.origin_mm + ray.direction * distance_mm));
+    let camera = &source.cameras()[camera_idx];
+    let rays = CameraRays::new(source, camera_idx, camera);
+    let view_from_camera = view.rig_from_view.inverse() * rays.rig_from_camera;
+    let seen: Vec<(PixelPoint, Vector3<f64>)> = rays
+        .on_lattice(PLACES)
+        .into_iter()
+        .filter_map(|(pixel, ray)| {
+            let point = view_from_camera.point(&(ray.origin_mm + ray.direction * distance_mm));
             let is_shown = point.z > 0.0 && point.xy().norm() < WIDEST * point.z;
             is_shown.then_some((pixel, point))
         })

@@ -1,8 +1,8 @@
 //! Which pixel of a camera sees a point, from its rays alone: a blob and a calibration are asked alike, and nothing but calibrated pixels
 //! is found.
 //!
-//! [`calib_rays::field::RayField::project`] does it for one point from nowhere, at a hundred lookups; a mesh asks for a million points,
-//! each a pixel beside the one before, at some four lookups each.
+//! [`calib_rays::field::RayField::project`] does it for one point from nowhere, at a hundred lookups; a mesh or a map asks for a million points,
+//! near a guess, at some four to six lookups each.
 
 use calib_blob::rays::RaySource;
 use calib_rays::geometry::{PixelPoint, Ray, SensorSize};
