@@ -9,35 +9,10 @@ use std::str::FromStr;
 
 /// The numbers that a source computes with. Pixels are read straight into it and points written
 /// with the shortest digits that read back to the same bits.
-pub trait Number: RealField + Copy + FromStr + zmij::Float + Into<f64> + Send + Sync {
-    /// The number nearest to `digits / power`, if one division in `f64` can tell which that is. `power` is a power of
-    /// ten up to the 22nd, which are exact.
-    fn quotient(digits: u64, power: f64) -> Option<Self>;
-}
+pub trait Number: RealField + Copy + FromStr + zmij::Float + Into<f64> + Send + Sync {}
 
-impl Number for f32 {
-    #[inline]
-    fn quotient(digits: u64, power: f64) -> Option<Self> {
-        /// Binary digits that an `f32` lacks of an `f64`.
-        const DROPPED: u32 = f64::MANTISSA_DIGITS - f32::MANTISSA_DIGITS;
-        /// The quotient is rounded twice, each time by half of its last digit at most, which is as much as two of the
-        /// result's where that is a little above a power of two.
-        const OFF_BY: u64 = 4;
-        let quotient = digits as f64 / power;
-        let middle = 1u64 << (DROPPED - 1);
-        let dropped = quotient.to_bits() & (2 * middle - 1);
-        // From 1e-22 to 2e19, or 0: neither too large for an `f32` nor too small.
-        (dropped.abs_diff(middle) > OFF_BY).then_some(quotient as f32)
-    }
-}
-
-impl Number for f64 {
-    #[inline]
-    fn quotient(digits: u64, power: f64) -> Option<Self> {
-        // Both exact, so that there is one rounding.
-        (digits <= 1 << f64::MANTISSA_DIGITS).then_some(digits as f64 / power)
-    }
-}
+impl Number for f32 {}
+impl Number for f64 {}
 
 /// Camera index and pixel (u, v).
 pub type Sighting<N> = (usize, [N; 2]);

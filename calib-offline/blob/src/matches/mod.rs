@@ -6,7 +6,6 @@
 
 pub mod blob_source;
 mod chosen;
-mod decimal;
 mod error;
 mod header;
 pub mod known;

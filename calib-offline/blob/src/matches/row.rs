@@ -1,6 +1,5 @@
 //! One line of `MATCHES.csv` to one line of `POINTS.csv`, without allocating.
 
-use super::decimal;
 use super::error::{RowProblem, shortened};
 use super::header::Columns;
 use calib_rays::measure::{Number, Point, Sighting, Status};
@@ -48,29 +47,29 @@ pub(super) fn parse_plain<'a, N: Number>(
     sightings: &mut Vec<Sighting<N>>,
 ) -> Option<(&'a str, &'a str)> {
     sightings.clear();
-    let bytes = text.as_bytes();
-    let id_end = bytes
-        .iter()
-        .position(|b| matches!(b, b',' | b'\n' | b'"'))?;
-    let mut rest = &bytes[id_end..];
+    let is_end = |b: &u8| matches!(b, b',' | b'\n' | b'"');
+    let id_end = text.as_bytes().iter().position(is_end)?;
+    let (id, mut rest) = text.split_at(id_end);
     for &camera_idx in &columns.camera_idx {
-        let [b',', behind @ ..] = rest else {
-            return None;
-        };
-        let (u, behind) = decimal::leading(behind)?;
-        let [b',', behind @ ..] = behind else {
-            return None;
-        };
-        let (v, behind) = decimal::leading(behind)?;
+        let (u, behind) = leading(rest.strip_prefix(',')?)?;
+        let (v, behind) = leading(behind.strip_prefix(',')?)?;
         sightings.push((camera_idx, [u, v]));
         rest = behind;
     }
-    let rest = match rest {
-        [] | [b'\n'] | [b'\r', b'\n'] => &[],
-        [b'\n', behind @ ..] | [b'\r', b'\n', behind @ ..] => behind,
-        _ => return None,
-    };
-    Some((&text[..id_end], &text[text.len() - rest.len()..]))
+    let behind = rest.strip_prefix('\r').unwrap_or(rest);
+    match behind.strip_prefix('\n') {
+        Some(behind) => Some((id, behind)),
+        None => rest.is_empty().then_some((id, rest)),
+    }
+}
+
+/// The number of digits alone, perhaps with a point and a sign, at the start of `text`, and what follows it.
+#[inline]
+fn leading<N: Number>(text: &str) -> Option<(N, &str)> {
+    let is_plain = |b: &u8| matches!(b, b'0'..=b'9' | b'.' | b'-');
+    let behind = text.as_bytes().iter().position(|b| !is_plain(b));
+    let (number, rest) = text.split_at(behind.unwrap_or(text.len()));
+    Some((number.parse().ok()?, rest))
 }
 
 /// The id of a row, without the quotes that may protect it.
