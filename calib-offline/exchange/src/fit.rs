@@ -2,6 +2,7 @@
 
 use super::distortion::{Distortion, MOST_COEFFICIENTS};
 use super::lens::{Lens, NUMBERS};
+use super::line;
 use calib_rays::geometry::so3::{self, skew};
 use calib_rays::geometry::{PixelPoint, SensorSize};
 use calib_rays::numerics::levenberg::{self, Problem, Tried};
@@ -35,7 +36,6 @@ pub(super) type Turned = (Lens, Matrix3<f64>);
 /// The lens without distortion that comes nearest, as it stands: a fisheye or a pinhole. `None` where a pinhole has points beside or
 /// behind it, or the image is mirrored.
 pub(super) fn ideal(sensor: SensorSize, is_fisheye: bool, samples: &[Sample]) -> Option<Turned> {
-    let count = samples.len() as f64;
     let place = |point: &Vector3<f64>| {
         if is_fisheye {
             let across = point.xy().norm();
@@ -51,29 +51,13 @@ pub(super) fn ideal(sensor: SensorSize, is_fisheye: bool, samples: &[Sample]) ->
     };
     let places: Vec<Vector2<f64>> = samples.iter().map(|(_, point)| place(point)).collect();
     let along = |axis: usize, px: fn(&PixelPoint) -> f64| {
-        let pairs = || {
-            places
-                .iter()
-                .zip(samples)
-                .map(|(place, (pixel, _))| (place[axis], px(pixel)))
-        };
-        let (mut mean_ideal, mut mean_px) = (0.0, 0.0);
-        for (ideal, px) in pairs() {
-            mean_ideal += ideal / count;
-            mean_px += px / count;
-        }
-        let (mut square, mut product) = (0.0, 0.0);
-        for (ideal, px) in pairs() {
-            square += (ideal - mean_ideal).powi(2);
-            product += (ideal - mean_ideal) * (px - mean_px);
-        }
-        let focal_px = product / square;
-        (focal_px, mean_px - focal_px * mean_ideal)
+        let both = places.iter().zip(samples);
+        line::rising(both.map(|(place, (pixel, _))| (place[axis], px(pixel))))
     };
-    let (fx, cx) = along(0, |pixel| pixel.u);
-    let (fy, cy) = along(1, |pixel| pixel.v);
+    let (fx, cx) = along(0, |pixel| pixel.u)?;
+    let (fy, cy) = along(1, |pixel| pixel.v)?;
     let is_seen = is_fisheye || samples.iter().all(|(_, point)| point.z > 0.0);
-    (is_seen && fx > 0.0 && fy > 0.0).then(|| {
+    is_seen.then(|| {
         let distortion = if is_fisheye {
             Distortion::Equidistant
         } else {

@@ -23,6 +23,7 @@ mod foreign;
 mod foreign_rig;
 pub mod kalibr;
 mod lens;
+mod line;
 mod loss;
 pub mod matlab;
 pub mod mesh;

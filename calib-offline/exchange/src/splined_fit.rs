@@ -7,6 +7,7 @@ use super::camera_rays::{CameraRays, samples};
 use super::distortion::Distortion;
 use super::error::ExchangeError;
 use super::fit::Sample;
+use super::line;
 use super::loss::{Loss, LossMap, missed};
 use super::model::{CameraModel, ImagePlane, Order, Splined, stereographic};
 use super::nearest::{LOSS_PLACES, MAP_PLACES, nearest};
@@ -205,27 +206,12 @@ fn places_of(samples: &[Sample]) -> Option<Vec<Vector2<f64>>> {
 
 /// Focal lengths and principal point of the plain projection that comes nearest; `None` for a mirrored image.
 fn core_of(samples: &[Sample], places: &[Vector2<f64>]) -> Option<[f64; 4]> {
-    let count = places.len() as f64;
     let along = |axis: usize, px: fn(&PixelPoint) -> f64| {
-        let pairs = || {
-            places
-                .iter()
-                .zip(samples)
-                .map(|(place, (pixel, _))| (place[axis], px(pixel)))
-        };
-        let (sum_place, sum_px) =
-            pairs().fold((0.0, 0.0), |(a, b), (place, px)| (a + place, b + px));
-        let (mean_place, mean_px) = (sum_place / count, sum_px / count);
-        let (mut square, mut product) = (0.0, 0.0);
-        for (place, px) in pairs() {
-            square += (place - mean_place).powi(2);
-            product += (place - mean_place) * (px - mean_px);
-        }
-        let focal_px = product / square;
-        (focal_px, mean_px - focal_px * mean_place)
+        let both = places.iter().zip(samples);
+        line::rising(both.map(|(place, (pixel, _))| (place[axis], px(pixel))))
     };
-    let ((fx, cx), (fy, cy)) = (along(0, |pixel| pixel.u), along(1, |pixel| pixel.v));
-    (fx > 0.0 && fy > 0.0).then_some([fx, fy, cx, cy])
+    let ((fx, cx), (fy, cy)) = (along(0, |pixel| pixel.u)?, along(1, |pixel| pixel.v)?);
+    Some([fx, fy, cx, cy])
 }
 
 /// The knots by linear least squares over pixels.

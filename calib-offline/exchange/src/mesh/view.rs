@@ -3,6 +3,7 @@
 use super::error::MeshError;
 use crate::camera_rays::CameraRays;
 use crate::distortion::Distortion;
+use crate::line;
 use crate::nearest::nearest_pinholes;
 use crate::rectify::pair_axes;
 use calib_blob::rays::RaySource;
@@ -104,14 +105,12 @@ fn fitted(source: &dyn RaySource, camera_idx: usize, distance_mm: f64, view: Vie
             is_shown.then_some((pixel, point))
         })
         .collect();
-    let u = line(
-        &seen
-            .iter()
+    let u = line::rising(
+        seen.iter()
             .map(|(pixel, point)| (point.x / point.z, pixel.u)),
     );
-    let v = line(
-        &seen
-            .iter()
+    let v = line::rising(
+        seen.iter()
             .map(|(pixel, point)| (point.y / point.z, pixel.v)),
     );
     match (u, v) {
@@ -122,15 +121,4 @@ fn fitted(source: &dyn RaySource, camera_idx: usize, distance_mm: f64, view: Vie
         },
         _ => view,
     }
-}
-
-/// Slope and start of the line nearest to places, if it rises.
-fn line(places: &(impl Iterator<Item = (f64, f64)> + Clone)) -> Option<(f64, f64)> {
-    let count = places.clone().count() as f64;
-    let sum = |of: fn((f64, f64)) -> f64| places.clone().map(of).sum::<f64>() / count;
-    let (x, y) = (sum(|place| place.0), sum(|place| place.1));
-    let square = sum(|(x, _)| x * x) - x * x;
-    let product = sum(|(x, y)| x * y) - x * y;
-    let slope = product / square;
-    (slope > 0.0 && slope.is_finite()).then_some((slope, y - slope * x))
 }
