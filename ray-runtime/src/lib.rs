@@ -19,6 +19,7 @@ pub mod format;
 mod grid;
 mod knots;
 mod lookup;
+mod mask;
 mod match_noise;
 #[cfg(feature = "nalgebra")]
 mod nalgebra_types;
@@ -26,6 +27,7 @@ mod polynomial;
 mod project;
 mod quantized;
 mod ray;
+mod row;
 mod self_test;
 mod sensor_window;
 mod spline;
@@ -41,6 +43,7 @@ pub use error::{LookupError, MeasureError, OpenError, ProjectError, ReadoutError
 pub use match_noise::MatchNoise;
 pub use project::{EpipolarCurve, EpipolarPoint};
 pub use ray::{PixelPoint, Ray};
+pub use row::{Matched, Row, RowPoint};
 pub use self_test::{SelfTestFailure, SelfTests};
 pub use sensor_window::{Readout, SensorWindow};
 pub use triangulate::{MIN_PARALLAX_SIN, Triangulation, triangulate_pair};
