@@ -1,6 +1,6 @@
 //! A pixel's ray from a camera's table.
 
-use crate::format::{Encoding, Form, OLDEST_VERSION, Record};
+use crate::format::{Encoding, Form, Record};
 use crate::grid::Inside;
 use crate::polynomial::{self, Dual, Number};
 use crate::quantized;
@@ -74,6 +74,11 @@ pub(crate) const NON_CENTRAL_PATCHES: u32 = number(Form::Patches, false);
 const CENTRAL_SPLINE: u32 = number(Form::Spline, true);
 const NON_CENTRAL_SPLINE: u32 = number(Form::Spline, false);
 
+/// Forms that are read: nothing is linked of those that are not.
+pub(crate) const HAS_PATCHES: bool = cfg!(feature = "patches");
+pub(crate) const HAS_QUANTIZED: bool = cfg!(feature = "quantized");
+const HAS_SPLINES: bool = cfg!(feature = "old-versions");
+
 const fn number(form: Form, is_central: bool) -> u32 {
     Encoding { form, is_central }.number()
 }
@@ -84,7 +89,7 @@ impl Views<'_> {
     pub fn lookup(&self, record: Record<'_>, pixel: PixelPoint) -> Result<Ray, LookupError> {
         let places = calibrated(self.bytes, record, pixel).ok_or(LookupError::Outside)?;
         // The form that is for speed, in the place of the call; all others behind another one.
-        if record.encoding() == CENTRAL_PATCHES {
+        if HAS_PATCHES && record.encoding() == CENTRAL_PATCHES {
             let [s] = self.patch::<1, f32>(record, places)?;
             Ok(central_ray(Pose::of(record), s))
         } else {
@@ -95,13 +100,16 @@ impl Views<'_> {
     /// The ray of a calibrated pixel from a table of another form.
     #[inline(never)]
     fn lookup_other(&self, record: Record<'_>, pixel: PixelPoint) -> Result<Ray, LookupError> {
-        if record.encoding() == NON_CENTRAL_PATCHES {
+        if HAS_PATCHES && record.encoding() == NON_CENTRAL_PATCHES {
             let [s, n] = self.patch::<2, f32>(record, inside(record, pixel)?)?;
             Ok(shifted_ray(Pose::of(record), Sample { s, n }))
         } else if is_spline(record) {
             lookup_spline(self.pairs, record, pixel)
-        } else {
+        } else if HAS_QUANTIZED {
             quantized::lookup(self.pairs, record, from_edge(record, pixel))
+        } else {
+            // Never: `open` refuses what is left out.
+            Err(LookupError::Outside)
         }
     }
 
@@ -117,21 +125,24 @@ impl Views<'_> {
     ) -> Result<MovingRay, LookupError> {
         let places = inside(record, pixel)?;
         let sample: Sample<Dual> = match record.encoding() {
-            CENTRAL_PATCHES => {
+            CENTRAL_PATCHES if HAS_PATCHES => {
                 let [s] = self.patch(record, places)?;
                 Sample {
                     s,
                     n: [0.0.into(); 2],
                 }
             }
-            NON_CENTRAL_PATCHES => {
+            NON_CENTRAL_PATCHES if HAS_PATCHES => {
                 let [s, n] = self.patch(record, places)?;
                 Sample { s, n }
             }
             _ if is_spline(record) => {
                 spline::sample(self.pairs, record, pixel).ok_or(LookupError::Outside)?
             }
-            _ => quantized::sample_moving(self.pairs, record, pixel).ok_or(LookupError::Outside)?,
+            _ if HAS_QUANTIZED => {
+                quantized::sample_moving(self.pairs, record, pixel).ok_or(LookupError::Outside)?
+            }
+            _ => return Err(LookupError::Outside),
         };
         let part = |part: fn(Dual) -> f32| Sample {
             s: sample.s.map(part),
@@ -177,7 +188,7 @@ impl Views<'_> {
 /// are not read.
 #[inline(always)]
 pub(crate) fn is_spline(record: Record<'_>) -> bool {
-    OLDEST_VERSION < 3 && matches!(record.encoding(), CENTRAL_SPLINE | NON_CENTRAL_SPLINE)
+    HAS_SPLINES && matches!(record.encoding(), CENTRAL_SPLINE | NON_CENTRAL_SPLINE)
 }
 
 /// The ray from such a table.
@@ -262,8 +273,14 @@ pub(crate) fn from_edge(record: Record<'_>, pixel: PixelPoint) -> PixelPoint {
 /// Where a pixel lies in the region.
 #[inline(always)]
 fn inside(record: Record<'_>, pixel: PixelPoint) -> Result<[Inside; 2], LookupError> {
-    let u = record.axis_u().inside(pixel.u).ok_or(LookupError::Outside)?;
-    let v = record.axis_v().inside(pixel.v).ok_or(LookupError::Outside)?;
+    let u = record
+        .axis_u()
+        .inside(pixel.u)
+        .ok_or(LookupError::Outside)?;
+    let v = record
+        .axis_v()
+        .inside(pixel.v)
+        .ok_or(LookupError::Outside)?;
     Ok([u, v])
 }
 

@@ -1,6 +1,7 @@
 //! What goes in and what comes out: a pixel, and the line in space that it sees.
 
 /// A point on the sensor, px: the center of the top-left pixel is (0, 0), u right, v down.
+#[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PixelPoint {
     /// To the right.

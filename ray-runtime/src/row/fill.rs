@@ -6,7 +6,8 @@ use crate::Ray;
 use crate::format::{PLACES_PER_CELL, Record};
 use crate::grid::Inside;
 use crate::lookup::{
-    CENTRAL_PATCHES, NON_CENTRAL_PATCHES, Pose, Sample, Views, central_ray, is_spline, shifted_ray,
+    CENTRAL_PATCHES, HAS_PATCHES, HAS_QUANTIZED, NON_CENTRAL_PATCHES, Pose, Sample, Views,
+    central_ray, is_spline, shifted_ray,
 };
 use crate::mask::MaskRow;
 use crate::polynomial::AlongX;
@@ -32,13 +33,13 @@ impl<'a> Views<'a> {
         if let Some(places) = Places::of(record.axis_u(), row, start, rays.len()) {
             let mask = MaskRow::at(self.bytes, record, v);
             match record.encoding() {
-                CENTRAL_PATCHES => {
+                CENTRAL_PATCHES if HAS_PATCHES => {
                     return fill(&Patches::<1>::of(self, record, v), &places, mask, rays);
                 }
-                NON_CENTRAL_PATCHES => {
+                NON_CENTRAL_PATCHES if HAS_PATCHES => {
                     return fill(&Patches::<2>::of(self, record, v), &places, mask, rays);
                 }
-                _ if is_spline(record) => {}
+                _ if is_spline(record) || !HAS_QUANTIZED => {}
                 _ => {
                     if let Some(usual) = UsualRow::of(self.pairs, record, v) {
                         return fill(&usual, &places, mask, rays);
@@ -117,14 +118,15 @@ impl<const MAPS: usize> Form for Patches<'_, MAPS> {
     }
 
     #[inline(never)]
-    fn write(&self, cell: u32, first_px: f32, step_px: f32, rays: &mut [Ray]) -> Option<()> {
+    fn write(&self, cell: u32, first_px: f32, step_px: f32, mut rays: &mut [Ray]) -> Option<()> {
         let axis = self.record.axis_u();
         let cell_edge_px = axis.cell_edge_px(cell);
         let maps: &[_; MAPS] = self.maps.get(cell as usize * MAPS..)?.first_chunk()?;
         let maps: [AlongX; MAPS] = core::array::from_fn(|k| AlongX::new(&maps[k], self.y));
         let pose = Pose::of(self.record);
         let mut from_edge_px = first_px;
-        for ray in rays {
+        while let Some((ray, rest)) = rays.split_first_mut() {
+            rays = rest;
             // Keeps the compiler from unrolling the loop, for which there are not registers enough.
             black_box(());
             let x = axis.share(from_edge_px, cell_edge_px);

@@ -3,6 +3,7 @@
 use super::Row;
 use crate::format::Axis;
 use crate::mask::MaskRow;
+use core::hint::black_box;
 
 /// Pixels whose columns are whole multiples of this have exact distances from the region's edge, px.
 const GRAIN_PX: f32 = 1.0 / 256.0;
@@ -81,10 +82,13 @@ impl Places {
         // Saturating; what is not a number is 0.
         let steps = ((border_px - self.at(from)) * self.per_step) as u32 as usize;
         let mut end = from.saturating_add(steps).saturating_add(1).min(to);
+        // Hardly ever more than once: the black boxes keep the compiler from unrolling.
         while end < to && has(self.at(end)) {
+            black_box(());
             end += 1;
         }
         while end > from && !has(self.at(end - 1)) {
+            black_box(());
             end -= 1;
         }
         end
@@ -132,6 +136,9 @@ impl<'a> Calibrated<'a> {
             self.set_until = self.mask.set_until(first);
         }
         let is_set = first < self.set_until;
+        if is_set && self.is_known(places, to) {
+            return (true, to);
+        }
         let end = if is_set { self.set_until } else { first + 1 };
         let is_known = |k: &usize| self.mask.cell(places.at(*k)) < end;
         (is_set, (from + 1..to).find(|k| !is_known(k)).unwrap_or(to))

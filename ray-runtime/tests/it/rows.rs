@@ -1,7 +1,8 @@
 //! Rows against single questions, bit by bit: all golden blobs, all rows.
 
 use ray_runtime::{
-    Aligned, LookupError, Matched, MeasureError, PixelPoint, Ray, RayBlob, Row, RowPoint,
+    Aligned, EpipolarRun, LookupError, Matched, MeasureError, PixelPoint, Ray, RayBlob, Row,
+    RowPoint,
 };
 
 macro_rules! golden {
@@ -204,4 +205,92 @@ fn points_of_a_row_have_the_bits_of_single_ones() {
                 .is_err()
         );
     });
+}
+
+#[test]
+fn an_epipolar_table_has_the_ends_of_what_is_seen() {
+    each_blob(|name, blob| {
+        let range_mm = [250.0, 2000.0];
+        let mut counts = [0; 3];
+        for v in [3.0, 20.0, 41.0] {
+            let row = Row {
+                first: PixelPoint::new(-1.0, v),
+                step_px: 3,
+            };
+            let mut runs = [EpipolarRun::NONE; 22];
+            blob.epipolar_row(0, &row, 1, range_mm, &mut runs).unwrap();
+            for (k, run) in runs.iter().enumerate() {
+                let pixel = row.pixel(k);
+                let Ok(curve) = blob.epipolar_curve((0, pixel), 1, range_mm, 64) else {
+                    assert!(run.is_none());
+                    counts[0] += 1;
+                    continue;
+                };
+                let curve: Vec<_> = curve.collect();
+                let Some((first, last)) = curve.first().zip(curve.last()) else {
+                    assert!(run.is_none(), "{name} {v} {k}");
+                    counts[0] += 1;
+                    continue;
+                };
+                // Newton's method ends within 1e-4 px wherever it starts.
+                for (found, expected) in [(run.far, first.pixel), (run.near, last.pixel)] {
+                    let off = (found.u - expected.u).hypot(found.v - expected.v);
+                    assert!(off < 2e-4, "{name} {v} {k}: {off}");
+                }
+                counts[if curve.len() == 64 { 1 } else { 2 }] += 1;
+            }
+        }
+        assert!(counts.iter().all(|count| *count > 0), "{name} {counts:?}");
+        let row = Row {
+            first: PixelPoint::new(30.0, 20.0),
+            step_px: 1,
+        };
+        let mut run = [EpipolarRun::NONE];
+        assert!(blob.epipolar_row(0, &row, 2, range_mm, &mut run).is_err());
+        assert!(blob.epipolar_row(2, &row, 0, range_mm, &mut run).is_err());
+        blob.epipolar_row(0, &row, 1, [0.0, 100.0], &mut run)
+            .unwrap();
+        assert!(run[0].is_none());
+    });
+}
+
+#[test]
+fn holes_in_the_mask_have_no_rays() {
+    // The calibrated area of the first camera, 48 x 36 cells of 4/3 px, with every bit drawn anew.
+    for (name, bytes) in GOLDEN {
+        let mask = usize::try_from(first_mask(bytes)).unwrap();
+        let mut words = vec![0_u64; bytes.0.len() / 8];
+        let changed: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
+        changed.copy_from_slice(&bytes.0);
+        let mut random = split_mix::SplitMix(3);
+        for byte in &mut changed[mask..mask + 216] {
+            // Three of four bits, so that there are runs.
+            *byte = (random.next() | random.next()) as u8;
+        }
+        let crc = ray_runtime::format::checksum(changed).unwrap();
+        changed[12..16].copy_from_slice(&crc.to_le_bytes());
+        let blob = RayBlob::open(changed).unwrap();
+        let mut counts = [0; 2];
+        for v in 0..48_u8 {
+            for (u, step_px) in [(0.0, 1), (-0.25, 1), (0.5, 2)] {
+                let row = Row {
+                    first: PixelPoint::new(u, v.into()),
+                    step_px,
+                };
+                let found = compare(&blob, 0, &row, &mut [Ray::OUTSIDE; 64], name);
+                counts = [counts[0] + found[0], counts[1] + found[1]];
+            }
+        }
+        assert!(
+            counts.iter().all(|count| *count > 1000),
+            "{name} {counts:?}"
+        );
+    });
+}
+
+/// Where the first camera's mask starts in a golden blob: word 6 of its record.
+fn first_mask(bytes: &Aligned<[u8]>) -> u32 {
+    let word = |at: usize| u32::from_le_bytes(bytes.0[at..at + 4].try_into().unwrap());
+    let records = ray_runtime::format::aligned(24 + word(16) as usize);
+    word(records + 24)
 }
