@@ -25,7 +25,7 @@ const NEW: [u8; 16] = *b"the new rig     ";
 const NEXT: [u8; 16] = *b"the one after it";
 
 /// Units of an entry of the log.
-const ENTRY_UNITS: u64 = 4;
+const ENTRY_UNITS: u64 = 7;
 
 struct Stopped;
 
@@ -106,7 +106,7 @@ fn flash_with_old(has_older: bool) -> SimFlash {
 }
 
 fn copy(flash: &SimFlash, seed: u64) -> SimFlash {
-    SimFlash::with_contents(flash.contents(), seed).unwrap()
+    flash.copy(seed)
 }
 
 /// The operations of `requests` without any cut, and how many of them a start alone takes: none.
@@ -259,7 +259,7 @@ fn a_second_cut_while_the_device_recovers() {
     for has_older in [false, true] {
         let before = flash_with_old(has_older);
         let total = operations(&before, &requests);
-        for first in std::iter::once(0).chain(total - 8..total) {
+        for first in std::iter::once(0).chain(total - 2 * ENTRY_UNITS..total) {
             for byte in [0, 1, 4, 7, 8] {
                 for cut in [Cut::Torn, Cut::Weak] {
                     let first = PowerCut {
@@ -267,7 +267,7 @@ fn a_second_cut_while_the_device_recovers() {
                         byte,
                         cut,
                     };
-                    for operation in 0..5 {
+                    for operation in 0..=ENTRY_UNITS {
                         for byte in [0, 3, 7, 8] {
                             for cut in MANNERS {
                                 let second = PowerCut {
@@ -303,7 +303,7 @@ fn cut_after_cut() {
         let before = &befores[below(2) as usize];
         let first = match below(4) {
             0 => below(total),
-            _ => total - 1 - below(8),
+            _ => total - 1 - below(2 * ENTRY_UNITS),
         };
         let mut cuts = vec![first];
         cuts.extend((0..below(8)).map(|_| 0));
@@ -311,7 +311,7 @@ fn cut_after_cut() {
             .into_iter()
             .enumerate()
             .map(|(number, operation)| PowerCut {
-                operation: if number == 0 { operation } else { below(6) },
+                operation: if number == 0 { operation } else { below(9) },
                 byte: below(UNIT as u64 + 1) as usize,
                 cut: MANNERS[below(3) as usize],
             })
@@ -332,11 +332,10 @@ fn a_bit_that_flips_at_rest() {
         flash
     };
     let blob_length = rig::blob_of(NEW).len();
-    let layout = copy(&before, 0).layout();
     let mut runs = 0;
     let mut kept = 0;
     for slot in [0, 1] {
-        let start = layout.slot_start(slot) as usize;
+        let start = before.slot_start(slot);
         let logs = start..start + 4 * 32;
         let blobs = start + BLOCK..start + BLOCK + blob_length;
         for address in logs.chain(blobs).chain([0, 100]) {
@@ -365,7 +364,7 @@ fn a_bit_that_flips_at_rest() {
 fn flash_that_fails_is_told_and_the_old_blob_stays() {
     let before = flash_with_old(true);
     let requests = update_to(NEW);
-    let slot = before.layout().slot_start(0) as usize;
+    let slot = before.slot_start(0);
     let blob_length = rig::blob_of(NEW).len();
     let mut runs = 0;
     for address in (0..blob_length).step_by(UNIT) {
@@ -393,7 +392,7 @@ fn flash_that_fails_is_told_and_the_old_blob_stays() {
         assert_eq!(active(&mut flash), Some(OLD));
         runs += 1;
     }
-    for unit in 0..4 {
+    for unit in 0..ENTRY_UNITS as usize {
         // One entry is left out.
         let mut flash = copy(&before, 1);
         flash.break_unit(slot + unit * UNIT);
@@ -401,8 +400,8 @@ fn flash_that_fails_is_told_and_the_old_blob_stays() {
         assert_eq!(active(&mut flash), Some(NEW));
         // None takes it.
         let mut flash = copy(&before, 1);
-        for entry in 0..128 {
-            flash.break_unit(slot + entry * 32 + unit * UNIT);
+        for entry in 0..64 {
+            flash.break_unit(slot + entry * 64 + unit * UNIT);
         }
         assert!(matches!(
             ask(&mut flash, &requests),

@@ -31,8 +31,8 @@ const RESERVE: u32 = 8;
 /// Length of an entry of the first layout, bytes: two have room in one of today's.
 const OLD_ENTRY_LENGTH: u32 = 32;
 
-/// Entries that are read between two looks at the watchdog: 4096 bytes of the longest.
-const ENTRIES_A_STEP: u32 = 4;
+/// Entries that are read between two looks at the watchdog: 2048 bytes of the longest, twice.
+const ENTRIES_A_STEP: u32 = 2;
 
 /// What a log says now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
