@@ -85,6 +85,14 @@ impl Effort {
         }
     }
 
+    /// Forgets what was between steps so far.
+    pub fn start_watching(&self) {
+        self.step();
+        for most in &self.most {
+            most.store(0, Ordering::Relaxed);
+        }
+    }
+
     /// Bytes read through the driver from any slot, so far.
     pub fn bytes_read(&self) -> u64 {
         self.read.load(Ordering::Relaxed)

@@ -196,14 +196,6 @@ impl FromStr for Rules {
                 )));
             }
         }
-        if !rules.shape().is_supported() {
-            return Err(BadRules(format!(
-                "unit={} with block={}: a block that a log shares with its blob must have room for 16 entries of {} bytes and more",
-                rules.unit,
-                rules.block,
-                rules.shape().entry_length()
-            )));
-        }
         Ok(rules)
     }
 }
