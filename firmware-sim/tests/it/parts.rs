@@ -4,8 +4,8 @@
 //! same blob, the old or the new one, and an update that succeeds; never a look in place at what cannot be read.
 //!
 //! `cargo test --release -p firmware-sim --test it parts -- --nocapture` prints how many cuts. With
-//! `SEEDS=10` in the environment every operation and every byte of a unit is cut, of three times as many kinds of
-//! part, otherwise some of them.
+//! `SEEDS=10` in the environment every operation is cut at every byte of a unit (longer than 16: at some 27), and
+//! three times as many kinds of part are tried.
 
 use crate::power_cuts::{
     MANNERS, NEW, NEXT, OLD, OLDER, active, ask, copy, seeds, status, survive, update_to, with_old,
@@ -35,8 +35,8 @@ fn blank(rules: &str) -> SimFlash {
     SimFlash::blank_with(rules, (front + 2 * slot) as usize, 0).unwrap()
 }
 
-/// Where in an operation of so many bytes to cut: everywhere in a unit if `all`, of a block all places that
-/// differ in what they hit.
+/// Where in an operation of so many bytes to cut: if `all`, at every byte of a unit of up to 16 and at some 27 of a
+/// longer one, among them the first nine and the last three; of a block at places that differ in what they hit.
 fn places(length: usize, unit: usize, all: bool) -> Vec<usize> {
     let mut places = if length > unit {
         vec![
@@ -51,8 +51,13 @@ fn places(length: usize, unit: usize, all: bool) -> Vec<usize> {
             length - 1,
             length,
         ]
-    } else if all {
+    } else if all && unit < 32 {
         (0..=length).collect()
+    } else if all {
+        (0..=8)
+            .chain((8..length).step_by(unit / 16))
+            .chain(length - 2..=length)
+            .collect()
     } else {
         vec![0, 1, length / 2, length - 1, length]
     };
@@ -62,9 +67,14 @@ fn places(length: usize, unit: usize, all: bool) -> Vec<usize> {
     places
 }
 
-/// Cuts `requests` short everywhere, or at some `share` of the operations in the middle.
-fn cut_everywhere(before: &SimFlash, requests: &[Request], either: [[u8; 16]; 2]) -> (u32, u32) {
-    let all = seeds() > 1;
+/// Cuts `requests` short, at every operation if `all`, otherwise at the first, at those of the commit and at some
+/// between; how often, and how often the second of `either` was in use then.
+fn cut_everywhere(
+    before: &SimFlash,
+    requests: &[Request],
+    either: [[u8; 16]; 2],
+    all: bool,
+) -> (u32, u32) {
     let mut dry = copy(before, 0);
     status(&mut dry);
     assert_eq!(dry.operations(), 0, "a start that has nothing to settle");
@@ -102,12 +112,12 @@ fn cut_everywhere(before: &SimFlash, requests: &[Request], either: [[u8; 16]; 2]
 }
 
 /// Cuts an update and a rollback everywhere, and starts that recover from that.
-fn try_part(rules: &str) -> u32 {
+fn try_part(rules: &str, all: bool) -> u32 {
     let before = with_old(blank(rules), true);
     let update = update_to(NEW);
-    let (updates, new) = cut_everywhere(&before, &update, [OLD, NEW]);
+    let (updates, new) = cut_everywhere(&before, &update, [OLD, NEW], all);
     assert!(new > 0 && new < updates, "{rules}: {new} of {updates}");
-    let (rollbacks, back) = cut_everywhere(&before, &[Request::Rollback], [OLD, OLDER]);
+    let (rollbacks, back) = cut_everywhere(&before, &[Request::Rollback], [OLD, OLDER], all);
     assert!(
         back > 0 && back < rollbacks,
         "{rules}: {back} of {rollbacks}"
@@ -159,7 +169,7 @@ fn try_unit(unit: u32) {
                 continue;
             }
             let rules = format!("unit={unit},block=4096,erased={erased}{more}");
-            runs += try_part(&rules);
+            runs += try_part(&rules, seeds() > 1 && is_always);
             parts += 1;
         }
     }
@@ -241,7 +251,7 @@ const REAL_PARTS: [(&str, &str); 18] = [
 fn real_parts() {
     let mut runs = 0;
     for (name, rules) in REAL_PARTS {
-        let cuts = try_part(rules);
+        let cuts = try_part(rules, seeds() > 1);
         println!("{name} ({rules}): {cuts} cuts, all survived");
         runs += cuts;
     }
@@ -292,7 +302,7 @@ fn a_cut_while_a_full_log_is_erased() {
     } else {
         [OLDER, OLD]
     };
-    let (runs, became_new) = cut_everywhere(&flash, &[Request::Rollback], either);
+    let (runs, became_new) = cut_everywhere(&flash, &[Request::Rollback], either, true);
     println!(
         "cuts while a full log is erased: {runs} runs, all survived; {became_new} rolled back"
     );
@@ -407,7 +417,7 @@ fn slots_of_the_first_layout_are_read() {
         assert_eq!(active(&mut flash), Some(OLDER));
         ask(&mut flash, &update_to(NEW)).unwrap();
         assert_eq!(active(&mut flash), Some(NEW));
-        let (runs, _) = cut_everywhere(&flash, &[Request::Rollback], [NEW, OLDER]);
+        let (runs, _) = cut_everywhere(&flash, &[Request::Rollback], [NEW, OLDER], false);
         assert!(runs > 0);
     }
 }
@@ -477,7 +487,7 @@ fn the_factory_blob_is_there_when_nothing_else_is() {
     let made: &[u8] = bytemuck::cast_slice(&aligned);
     for (name, rules) in REAL_PARTS {
         let mut flash = blank(rules);
-        let mut active = |flash: &mut SimFlash, requests: &[Request]| {
+        let active = |flash: &mut SimFlash, requests: &[Request]| {
             let replies = ask_with_factory(flash, made, requests);
             if let Some(Reply::Refused(refusal)) = replies.last() {
                 return Err(*refusal);
