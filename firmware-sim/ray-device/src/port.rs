@@ -153,7 +153,7 @@ pub trait Flash: NorFlash {
 
     /// What it is programmed and erased in. A driver that finds it out when it starts, such as one that asks
     /// a chip on a bus, says so here; its constants then are the least of what it may find.
-    #[inline(always)]
+    #[inline]
     fn geometry(&self) -> Geometry {
         Geometry::of::<Self>()
     }
@@ -185,7 +185,7 @@ pub trait Flash: NorFlash {
     }
 
     /// Where the region starts in the device's flash, for messages.
-    #[inline(always)]
+    #[inline]
     fn start(&self) -> u32 {
         0
     }

@@ -90,7 +90,7 @@ fn cut_everywhere(
         let is_chosen = is_commit && (unit >= 8 || operation % 8 < 2)
             || operation < 2
             || length > unit
-            || operation % stride == 0;
+            || operation.is_multiple_of(stride);
         if !all && !is_chosen {
             continue;
         }
@@ -641,4 +641,44 @@ fn the_constants_of_a_driver_are_enough() {
     flashed::<32, 131_072>();
     flashed::<128, 8192>();
     flashed::<512, 512>();
+}
+
+/// A cut while the slot that could be rolled back to is being erased: a rollback is refused or lasts.
+#[test]
+fn a_rollback_after_a_cut_is_refused_or_lasts() {
+    let (mut refused, mut done) = (0, 0);
+    for (name, rules) in REAL_PARTS {
+        let before = with_old(blank(rules), true);
+        let update = update_to(NEW);
+        let block = before.rules().log_geometry().block as usize;
+        for (operation, byte) in [(0, 0), (0, 64), (0, block - 8), (0, block), (1, 0), (2, 4)] {
+            for cut in MANNERS {
+                for seed in 0..3 {
+                    let mut flash = copy(&before, seed);
+                    flash.plan_cut(Some(PowerCut {
+                        operation,
+                        byte,
+                        cut,
+                    }));
+                    let _ = ask(&mut flash, &update);
+                    assert_eq!(active(&mut flash), Some(OLD), "{name}");
+                    match ask(&mut flash, &[Request::Rollback]) {
+                        Ok(_) => done += 1,
+                        Err(_) => refused += 1,
+                    }
+                    let first = active(&mut flash);
+                    assert!(
+                        first == Some(OLD) || first == Some(OLDER),
+                        "{name}: {first:?}"
+                    );
+                    for start in 0..6 {
+                        assert_eq!(active(&mut flash), first, "{name}, start {start}");
+                    }
+                    assert_eq!(flash.unhandled_faults(), 0, "{name}");
+                }
+            }
+        }
+    }
+    println!("rollbacks after a cut in an erase: {done} last, {refused} are refused");
+    assert!(done > 0 && refused > 0);
 }
