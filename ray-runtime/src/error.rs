@@ -4,6 +4,8 @@
 //! One code space for the whole crate: 1 to 63 a blob that does not open, 64 to 127 a question
 //! that has no answer. Codes are never reused.
 
+use crate::rounding::Rounding;
+
 /// Which part of the blob an [`OpenError`] speaks of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Table {
@@ -104,6 +106,12 @@ pub enum OpenError {
         /// Its tag.
         tag: u16,
     },
+    /// The processor does not round to nearest, ties to even, so that its answers would be others. Nothing is wrong
+    /// with the blob: set the mode before it is opened, and leave it.
+    WrongRounding {
+        /// What it does.
+        found: Rounding,
+    },
 }
 
 impl OpenError {
@@ -125,6 +133,7 @@ impl OpenError {
             Self::BadPair { .. } => 13,
             Self::BadSection { .. } => 14,
             Self::UnknownSection { .. } => 15,
+            Self::WrongRounding { .. } => 16,
         }
     }
 }
@@ -319,8 +328,11 @@ mod tests {
             OpenError::BadPair { pair: 0 },
             OpenError::BadSection { section: 0 },
             OpenError::UnknownSection { tag: 2 },
+            OpenError::WrongRounding {
+                found: Rounding::TowardZero,
+            },
         ];
-        assert!(open.iter().map(|e| e.code()).eq(1..=15));
+        assert!(open.iter().map(|e| e.code()).eq(1..=16));
         assert_eq!(LookupError::Outside.code(), 64);
         assert_eq!(
             LookupError::NoSuchCamera {

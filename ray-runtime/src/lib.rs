@@ -24,6 +24,7 @@ mod polynomial;
 mod project;
 mod quantized;
 mod ray;
+mod rounding;
 mod self_test;
 mod sensor_window;
 mod spline;
@@ -38,6 +39,7 @@ pub use error::{LookupError, MeasureError, OpenError, ProjectError, ReadoutError
 pub use match_noise::MatchNoise;
 pub use project::{EpipolarCurve, EpipolarPoint};
 pub use ray::{PixelPoint, Ray};
+pub use rounding::Rounding;
 pub use self_test::{SelfTestFailure, SelfTests};
 pub use sensor_window::{Readout, SensorWindow};
 pub use triangulate::{MIN_PARALLAX_SIN, Triangulation, triangulate_pair};

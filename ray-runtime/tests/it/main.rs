@@ -10,3 +10,4 @@ mod questions;
 mod sections;
 mod test_blob;
 mod uncertainty;
+mod varints;
