@@ -13,6 +13,8 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use cortex_m::interrupt::InterruptNumber;
 use cortex_m::peripheral::NVIC;
+#[cfg(target_abi = "eabihf")]
+use cortex_m::register::fpscr::Fpscr;
 
 /// Start of the emulated flash.
 pub const FLASH_START: usize = 0x2100_0000;
@@ -188,6 +190,17 @@ pub fn refuse_to_link() -> ! {
     }
     // SAFETY: never linked, hence never called.
     unsafe { a_panic_is_reachable_in_this_image() }
+}
+
+/// Sets the mode that the floating-point unit computes in.
+///
+/// Rust takes it for granted that numbers are rounded to nearest, so code that runs in another mode may do
+/// anything with numbers. It is for the image that shows what the runtime does then.
+#[cfg(target_abi = "eabihf")]
+pub fn set_float_mode(mode: Fpscr) {
+    // SAFETY: a status and control register: writing it touches no memory. That numbers come out otherwise is what
+    // it is for.
+    unsafe { cortex_m::register::fpscr::write(mode) }
 }
 
 /// A hundred instructions and no other.

@@ -9,7 +9,7 @@ use ray_runtime::RayBlob;
 
 const MATCHES: u32 = 100_000;
 
-fn blobs() -> Vec<PathBuf> {
+pub fn blobs() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/golden");
     let files = std::fs::read_dir(folder).unwrap();
     let mut blobs: Vec<PathBuf> = files
@@ -22,11 +22,15 @@ fn blobs() -> Vec<PathBuf> {
 }
 
 fn on_host(path: &Path) -> Digest {
+    digest_on_host(path, MATCHES)
+}
+
+pub fn digest_on_host(path: &Path, matches: u32) -> Digest {
     let contents = std::fs::read(path).unwrap();
     let mut words = vec![0_u64; contents.len().div_ceil(8)];
     let (bytes, _) = bytemuck::cast_slice_mut(&mut words).split_at_mut(contents.len());
     bytes.copy_from_slice(&contents);
-    digest(&RayBlob::open(bytes).unwrap(), MATCHES).unwrap()
+    digest(&RayBlob::open(bytes).unwrap(), matches).unwrap()
 }
 
 fn in_image(image: &Path, blob: &Path) -> Digest {
