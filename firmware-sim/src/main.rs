@@ -10,6 +10,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use cost::InQemu;
+use firmware_cost::{CORES, Core};
 use firmware_sim::simulated::flash_file::{self, FlashFile};
 use firmware_sim::simulated::host::SimulatedDevice;
 use firmware_sim::simulated::qemu::{self, QemuDevice};
@@ -39,16 +40,19 @@ enum Command {
         #[arg(long, value_name = "ELF", conflicts_with = "public_key")]
         image: Option<PathBuf>,
     },
-    /// What the runtime costs on a Cortex-M4F: instructions counted in QEMU, stack, code. The images
+    /// What the runtime costs on a Cortex-M4F, or on other cores: instructions counted in QEMU, stack, code. The images
     /// are built first when they are missing or stale.
     Cost {
+        /// Count on the cores of this target alone, such as thumbv6m-none-eabi, and no code.
+        #[arg(long, value_name = "TARGET", value_parser = Core::targets(), conflicts_with = "markdown")]
+        target: Option<String>,
         /// Count this blob, instead of those that come with the sources.
         #[arg(long = "blob", value_name = "FILE")]
         blobs: Vec<PathBuf>,
         /// One JSON object instead of tables.
         #[arg(long)]
         json: bool,
-        /// The document ray-runtime/COST.md instead of tables.
+        /// The document ray-runtime/COST.md instead of tables: with all cores, whose images take some minutes to build.
         #[arg(long, conflicts_with = "json")]
         markdown: bool,
     },
@@ -162,21 +166,37 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         Command::Host(device) => run_on_host(device),
         Command::Qemu { device, image } => run_in_qemu(device, image.as_deref()),
         Command::Cost {
+            target,
             blobs,
             json,
             markdown,
         } => {
-            let cost = if blobs.is_empty() {
-                firmware_cost::measure(&InQemu, &firmware_cost::built_in())?
+            let usual = firmware_cost::usual(&firmware_cost::built_in());
+            let all = if blobs.is_empty() {
+                firmware_cost::built_in()
             } else {
-                firmware_cost::measure(&InQemu, blobs)?
+                blobs.clone()
             };
-            let text = if *json {
-                serde_json::to_string_pretty(&cost)? + "\n"
-            } else if *markdown {
-                cost.to_markdown()
+            let text = if let Some(target) = target {
+                let blobs = if blobs.is_empty() { &usual } else { blobs };
+                let cores = Core::of_target(target);
+                let across = firmware_cost::across(&InQemu, &cores, blobs)?;
+                if *json {
+                    serde_json::to_string_pretty(&across)? + "\n"
+                } else {
+                    across.to_text()
+                }
             } else {
-                cost.to_text()
+                let cost = firmware_cost::measure(&InQemu, &all)?;
+                if *json {
+                    serde_json::to_string_pretty(&cost)? + "\n"
+                } else if *markdown {
+                    let blobs = if blobs.is_empty() { &usual } else { blobs };
+                    let across = firmware_cost::across(&InQemu, &CORES, blobs)?;
+                    cost.to_markdown(&across)
+                } else {
+                    cost.to_text()
+                }
             };
             std::io::stdout()
                 .write_all(text.as_bytes())

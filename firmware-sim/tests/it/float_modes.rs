@@ -10,7 +10,7 @@ fn equal_bits_in_every_harmless_mode_and_no_blob_in_another_rounding() {
     let image = qemu::build_image("float_modes").unwrap();
     for blob in blobs() {
         let name = blob.display();
-        let output = qemu::run_to_end(&image, Some(&blob)).unwrap();
+        let output = qemu::DEVICE.run_to_end(&image, Some(&blob)).unwrap();
         let printed = String::from_utf8_lossy(&output.stdout);
         assert!(output.status.success(), "{name}: {printed}");
         let host = format!("{:08x}", digest_on_host(&blob, FLOAT_MODE_MATCHES).checksum);
