@@ -3,7 +3,7 @@
 #   embedded_available TARGET...   prints those of the targets for which there is a toolchain, and says which are left out
 #   embedded_env TARGET...   sets EMBEDDED_CARGO and exports what a build for these targets needs; returns 1 with the
 #                            remedy on standard error if there is no toolchain
-# EMBEDDED_RUSTFLAGS in the environment goes to the compiler for these targets, such as "-C target-cpu=cortex-m33".
+# EMBEDDED_RUSTFLAGS in the environment goes to the compiler for these targets, such as "-C target-feature=+dsp".
 #
 # Two kinds of toolchain serve, in this order:
 #   1. rustup, when the targets have been added to the toolchain in use;

@@ -18,7 +18,7 @@ use cortex_m::peripheral::NVIC;
 use cortex_m::register::fpscr::Fpscr;
 
 /// Start of the device's emulated flash.
-const FLASH_START: usize = 0x2100_0000;
+pub const FLASH_START: usize = 0x2100_0000;
 
 /// Its length, bytes.
 pub const FLASH_LENGTH: usize = 16 << 20;

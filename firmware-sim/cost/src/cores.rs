@@ -45,7 +45,7 @@ const CORTEX_M33: Core = Core {
     ..CORTEX_M4F
 };
 
-const DSP: &str = "-C target-cpu=cortex-m33";
+const DSP: &str = "-C target-feature=+dsp";
 
 /// All of them.
 pub const CORES: [Core; 8] = [

@@ -4,6 +4,7 @@
 mod app;
 mod power_cuts;
 mod rig;
+mod slot_image;
 mod snapshots;
 mod tcp;
 
