@@ -3,6 +3,8 @@
 use ray_runtime::MatchNoise;
 use serde::{Deserialize, Serialize};
 
+use crate::storage::OTHER_PART;
+
 /// Why a frame or a request was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Refusal {
@@ -149,6 +151,9 @@ impl core::fmt::Display for Refusal {
                             out,
                             "{WRONG_ROUNDING} (code {open_error}): mend its firmware, the blob is well"
                         );
+                    }
+                    OTHER_PART => {
+                        "its slot was written for another part, with another program unit or erase block"
                     }
                     _ => "the blob in its flash cannot be opened",
                 };
