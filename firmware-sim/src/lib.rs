@@ -3,5 +3,5 @@
 #[cfg(feature = "client")]
 pub mod client;
 pub mod simulated;
-#[cfg(feature = "client")]
+#[cfg(feature = "simulated")]
 pub mod slot_image;

@@ -1,13 +1,11 @@
 //! The image of a device's slot as a production line writes it: blob and sealed commit record, and the factory record if
-//! wanted, made by the storage of `ray-device` itself in a flash in memory with the rules of the device's part.
+//! wanted, made by the storage of `ray-device` itself in a simulated flash with the rules of the device's part.
 
-mod memory_flash;
 mod parts;
 
 use ray_device::frame::checksum;
-use ray_device::port::{Flash, Geometry, NoClock, Regions};
+use ray_device::port::NoClock;
 use ray_device::protocol::{CameraStatus, MAX_CAMERAS_LISTED, MAX_NAME, Refusal, Rig, name};
-use ray_device::storage::layout::{Layout, Shape};
 use ray_device::storage::log::Log;
 use ray_device::storage::record::Record;
 use ray_device::storage::slot::SlotFlash;
@@ -15,14 +13,15 @@ use ray_device::storage::{program_blob, program_manifest, rig};
 use ray_runtime::RayBlob;
 use thiserror::Error;
 
-pub use memory_flash::MemoryFlash;
+use crate::simulated::sim_flash::{Rules, SimFlash};
+
 pub use parts::{PARTS, Part};
 
 /// Where an image goes and what is in it.
 #[derive(Debug, Clone)]
 pub struct SlotImageOptions<'a> {
-    /// What the part is programmed and erased in.
-    pub geometry: Geometry,
+    /// The rules of the part's flash, as the device's driver states them.
+    pub rules: Rules,
     /// Where the flash starts that the device's firmware gives to the storage.
     pub region_address: u32,
     /// Its length, bytes.
@@ -68,7 +67,7 @@ pub enum SlotImageError {
         "no device stores a blob in flash with units of {} and blocks of {} bytes: both are powers of two, the unit of at most 512, the block of at least 64 and no less than the unit",
         .0.unit, .0.block
     )]
-    Unsupported(Geometry),
+    Unsupported(Rules),
     /// The region is not made of blocks.
     #[error("the region of {size} bytes at {address:#x} is not made of blocks of {block} bytes")]
     NotBlocks {
@@ -125,12 +124,13 @@ pub fn slot_image(
     blob: &[u8],
     options: &SlotImageOptions<'_>,
 ) -> Result<SlotImage, SlotImageError> {
-    let layout = layout(options)?;
+    let mut flash = blank(options)?;
     let mut words = vec![0_u64; blob.len().div_ceil(8)];
     let (copy, _) = bytemuck::cast_slice_mut(&mut words).split_at_mut(blob.len());
     copy.copy_from_slice(blob);
     let opened = RayBlob::open(copy).map_err(SlotImageError::Blob)?;
-    let mut regions = regions(options, layout);
+    let slot_at = flash.areas().slots + options.slot * flash.areas().slot;
+    let mut regions = flash.regions();
     if let Some(serial) = options.serial {
         let own = rig_of(&opened, serial)?;
         rig::write(&mut regions.factory, &own, &mut NoClock).map_err(SlotImageError::Storage)?;
@@ -157,13 +157,8 @@ pub fn slot_image(
         .and_then(|()| program_manifest(slot, record.length, options.manifest, &mut NoClock))
         .and_then(|()| Log::commit(slot, &record, &mut NoClock))
         .map_err(SlotImageError::Storage)?;
-    let blob_address = slot.start() + slot.shape().blob_start();
-    let [slot_0, slot_1] = &regions.slots;
-    Ok(image(
-        options,
-        blob_address,
-        &[&regions.factory, slot_0, slot_1],
-    ))
+    let blob_address = options.region_address + slot_at as u32 + slot.shape().blob_start();
+    Ok(image(options, blob_address, &flash))
 }
 
 /// The blob's cameras as a device's own.
@@ -189,24 +184,13 @@ fn rig_of(blob: &RayBlob<'_>, serial: &str) -> Result<Rig, SlotImageError> {
     })
 }
 
-/// The regions of a device whose flash was given these settings, blank: what a device with this image starts with once
-/// the image is put in.
-///
-/// # Errors
-/// [`SlotImageError`].
-pub fn blank_regions(
-    options: &SlotImageOptions<'_>,
-) -> Result<Regions<MemoryFlash>, SlotImageError> {
-    Ok(regions(options, layout(options)?))
-}
-
-fn layout(options: &SlotImageOptions<'_>) -> Result<Layout, SlotImageError> {
-    let geometry = options.geometry;
+/// The region as the device finds it on its first start.
+fn blank(options: &SlotImageOptions<'_>) -> Result<SimFlash, SlotImageError> {
+    let rules = options.rules;
     let (address, size) = (options.region_address, options.region_size);
-    let block = geometry.block;
-    let shape = Shape::of(geometry);
-    if !shape.is_supported() {
-        return Err(SlotImageError::Unsupported(geometry));
+    let block = rules.block;
+    if !rules.shape().is_supported() {
+        return Err(SlotImageError::Unsupported(rules));
     }
     if !(address.is_multiple_of(block) && size.is_multiple_of(block)) {
         return Err(SlotImageError::NotBlocks {
@@ -215,10 +199,11 @@ fn layout(options: &SlotImageOptions<'_>) -> Result<Layout, SlotImageError> {
             block,
         });
     }
-    let least = u64::from(block) + 2 * u64::from(shape.least_region());
+    let least = u64::from(block) + 2 * u64::from(rules.shape().least_region());
     let has_addresses = u64::from(address) + u64::from(size) <= 1 << 32;
-    Layout::of(size, geometry)
-        .filter(|_| has_addresses)
+    has_addresses
+        .then(|| SimFlash::blank_with(rules, size as usize, 0))
+        .flatten()
         .ok_or(SlotImageError::TooShort {
             address,
             size,
@@ -227,30 +212,25 @@ fn layout(options: &SlotImageOptions<'_>) -> Result<Layout, SlotImageError> {
         })
 }
 
-fn regions(options: &SlotImageOptions<'_>, layout: Layout) -> Regions<MemoryFlash> {
-    let of = |start, length| {
-        MemoryFlash::blank(options.geometry, options.region_address + start, length)
+/// What was programmed of a flash.
+fn image(options: &SlotImageOptions<'_>, blob_address: u32, flash: &SimFlash) -> SlotImage {
+    let units = flash.contents().chunks(options.rules.unit as usize);
+    let programmed = flash.programmed();
+    let is_programmed = |unit: usize| {
+        let bits = programmed.get(unit / 8).copied().unwrap_or(0);
+        bits >> (unit % 8) & 1 == 1
     };
-    Regions {
-        factory: of(0, layout.factory),
-        slots: [0, 1].map(|slot| of(layout.slot_start(slot), layout.slot)),
-    }
-}
-
-fn image(options: &SlotImageOptions<'_>, blob_address: u32, regions: &[&MemoryFlash]) -> SlotImage {
     let mut pieces: Vec<Piece> = Vec::new();
-    for region in regions {
-        for (start, bytes) in region.programmed() {
-            let address = region.start() + start;
-            match pieces.last_mut() {
-                Some(last) if last.address + last.bytes.len() as u32 == address => {
-                    last.bytes.extend(bytes);
-                }
-                _ => pieces.push(Piece {
-                    address,
-                    bytes: bytes.to_vec(),
-                }),
+    for (unit, bytes) in units.enumerate().filter(|(unit, _)| is_programmed(*unit)) {
+        let address = options.region_address + unit as u32 * options.rules.unit;
+        match pieces.last_mut() {
+            Some(last) if last.address + last.bytes.len() as u32 == address => {
+                last.bytes.extend(bytes);
             }
+            _ => pieces.push(Piece {
+                address,
+                bytes: bytes.to_vec(),
+            }),
         }
     }
     let address = pieces
@@ -258,7 +238,7 @@ fn image(options: &SlotImageOptions<'_>, blob_address: u32, regions: &[&MemoryFl
         .map_or(options.region_address, |piece| piece.address);
     let mut bytes = Vec::new();
     for piece in &pieces {
-        bytes.resize((piece.address - address) as usize, options.geometry.erased);
+        bytes.resize((piece.address - address) as usize, options.rules.erased);
         bytes.extend(&piece.bytes);
     }
     SlotImage {

@@ -12,8 +12,8 @@ use calib_blob::export::{self, ExportError, Uf2, uf2_filled_len};
 use calib_blob::pack::BlobError;
 use calib_recording::atomic_file;
 use clap::{Args, ValueEnum};
+use firmware_sim::simulated::sim_flash::{Ecc, Rules};
 use firmware_sim::slot_image::{PARTS, Part, SlotImage, SlotImageOptions, slot_image};
-use ray_device::port::Geometry;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -117,20 +117,20 @@ impl SlotArgs {
         self.container == Some(ContainerArg::Uf2)
     }
 
-    fn geometry(&self) -> Result<Geometry, UsageError> {
+    fn rules(&self) -> Result<Rules, UsageError> {
         if let Some(part) = self.part {
-            return Ok(part.geometry);
+            return Ok(part.rules);
         }
         let (Some(unit), Some(block)) = (self.unit, self.block) else {
             return Err(UsageError::SlotImageLacks {
                 option: "--part, or --unit and --block",
             });
         };
-        Ok(Geometry {
+        Ok(Rules {
             unit,
             block,
             erased: self.erased.unwrap_or(0xff),
-            needs_erase: true,
+            ..Rules::default()
         })
     }
 }
@@ -171,7 +171,7 @@ pub(super) fn write(args: &ExportArgs, console: &Console) -> Result<Outcome, Err
         None => Vec::new(),
     };
     let options = SlotImageOptions {
-        geometry: args.slot.geometry()?,
+        rules: args.slot.rules()?,
         region_address,
         region_size,
         slot: args.slot.slot.unwrap_or(0),
@@ -186,7 +186,7 @@ pub(super) fn write(args: &ExportArgs, console: &Console) -> Result<Outcome, Err
     };
     open(&bytes, &args.rig)?;
     let image = slot_image(&bytes, &options).map_err(UsageError::SlotImage)?;
-    let file = contained(args, container, &image, options.geometry.erased)?;
+    let file = contained(args, container, &image, options.rules.erased)?;
     atomic_file::write(&args.output, &file)?;
     let programmed = image.pieces.iter().map(|piece| piece.bytes.len()).sum();
     let object = SlotObject {
@@ -196,9 +196,9 @@ pub(super) fn write(args: &ExportArgs, console: &Console) -> Result<Outcome, Err
             ContainerArg::Uf2 => "uf2",
         },
         slot: options.slot,
-        unit: options.geometry.unit,
-        block: options.geometry.block,
-        erased: options.geometry.erased,
+        unit: options.rules.unit,
+        block: options.rules.block,
+        erased: options.rules.erased,
         region_address,
         region_size,
         blob_address: image.blob_address,
@@ -216,8 +216,7 @@ pub(super) fn write(args: &ExportArgs, console: &Console) -> Result<Outcome, Err
         args.output.display()
     );
     words += "; the rest of the region must be blank when the device starts";
-    let has_ecc = args.slot.part.is_some_and(|part| part.has_ecc);
-    if has_ecc && container != ContainerArg::Hex {
+    if options.rules.ecc != Ecc::None && container != ContainerArg::Hex {
         words += "; this part has ECC: what writes the blank units too leaves the device's log no room, so take --container hex";
     }
     tell_of_slot(

@@ -2,37 +2,38 @@
 //! needs its own numbers: an image is for the unit that the firmware's driver states. Which part of the flash the
 //! storage gets is the firmware's to say.
 
-use ray_device::port::Geometry;
+use crate::simulated::sim_flash::{Blank, Ecc, Rules};
 
 /// The flash of a part, or of a family of parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Part {
     /// Its name in small letters.
     pub name: &'static str,
-    /// What it is programmed and erased in.
-    pub geometry: Geometry,
-    /// Whether units carry ECC, so that a blank one must not be programmed.
-    pub has_ecc: bool,
+    /// How it is programmed and erased; with ECC, a blank unit must not be programmed.
+    pub rules: Rules,
 }
 
 const fn part(name: &'static str, unit: u32, block: u32, has_ecc: bool) -> Part {
     Part {
         name,
-        geometry: Geometry {
+        rules: Rules {
             unit,
             block,
             erased: 0xff,
+            ecc: if has_ecc { Ecc::Error } else { Ecc::None },
+            blank: Blank::Erased,
+            log_block: None,
             needs_erase: true,
+            stall_ms: 0,
         },
-        has_ecc,
     }
 }
 
 const fn erased_to_zero(part: Part) -> Part {
     Part {
-        geometry: Geometry {
+        rules: Rules {
             erased: 0,
-            ..part.geometry
+            ..part.rules
         },
         ..part
     }
@@ -40,9 +41,19 @@ const fn erased_to_zero(part: Part) -> Part {
 
 const fn without_erase(part: Part) -> Part {
     Part {
-        geometry: Geometry {
+        rules: Rules {
             needs_erase: false,
-            ..part.geometry
+            ..part.rules
+        },
+        ..part
+    }
+}
+
+const fn unreadable_blank(part: Part) -> Part {
+    Part {
+        rules: Rules {
+            blank: Blank::Fault,
+            ..part.rules
         },
         ..part
     }
@@ -74,7 +85,7 @@ pub const PARTS: [Part; 27] = [
     part("imxrt", 1, 4 << 10, false),
     part("samd51", 8, 8 << 10, true),
     part("same70", 16, 8 << 10, true),
-    part("lpc55", 512, 512, true),
+    unreadable_blank(part("lpc55", 512, 512, true)),
     part("mcxn", 16, 8 << 10, true),
     part("ra6", 128, 32 << 10, false),
 ];
@@ -90,12 +101,11 @@ impl Part {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ray_device::storage::layout::Shape;
 
     #[test]
     fn the_storage_works_on_every_part_and_names_are_their_own() {
         for (index, part) in PARTS.iter().enumerate() {
-            assert!(Shape::of(part.geometry).is_supported(), "{part:?}");
+            assert!(part.rules.shape().is_supported(), "{part:?}");
             assert_eq!(part.name, part.name.to_lowercase());
             assert!(PARTS[..index].iter().all(|other| other.name != part.name));
             assert_eq!(Part::of_name(&part.name.to_uppercase()), Some(part));

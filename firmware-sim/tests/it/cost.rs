@@ -205,7 +205,10 @@ fn what_cannot_be_counted_ends_with_code_2_and_its_reason() {
             "firmware-sim/Cargo.toml cannot be opened",
         ),
         (&["--json", "--markdown"], "--markdown"),
-        (&["--target", "x86_64-unknown-linux-gnu"], "thumbv6m-none-eabi"),
+        (
+            &["--target", "x86_64-unknown-linux-gnu"],
+            "thumbv6m-none-eabi",
+        ),
     ] {
         let output = run(arguments);
         let message = String::from_utf8_lossy(&output.stderr);

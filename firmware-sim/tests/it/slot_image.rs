@@ -1,16 +1,14 @@
-//! Images of slots for every part: a device whose flash holds one starts with the blob and answers its self-tests.
+//! Images of slots for every part: a simulated device with that part's rules whose flash holds one starts with the blob and
+//! answers its self-tests.
 
 use std::path::Path;
 
-use firmware_sim::slot_image::{
-    MemoryFlash, PARTS, SlotImage, SlotImageError, SlotImageOptions, blank_regions, slot_image,
-};
-use ray_device::app::Device;
-use ray_device::port::{Geometry, NoClock, Regions};
-use ray_device::protocol::{Reply, Request, Status};
-use ray_device::session::Responder;
+use firmware_sim::client::DeviceClient;
+use firmware_sim::simulated::host::SimulatedDevice;
+use firmware_sim::simulated::sim_flash::{Rules, SimFlash};
+use firmware_sim::slot_image::{PARTS, SlotImage, SlotImageError, SlotImageOptions, slot_image};
+use ray_device::protocol::Status;
 use ray_device::storage::OTHER_PART;
-use ray_device::storage::layout::Shape;
 use ray_runtime::RayBlob;
 
 fn blob() -> Vec<u8> {
@@ -22,9 +20,9 @@ fn blob() -> Vec<u8> {
 const REGION_SIZE: u32 = 4 * (256 << 10);
 const REGION_ADDRESS: u32 = 0x0810_0000;
 
-fn options(geometry: Geometry, slot: usize) -> SlotImageOptions<'static> {
+fn options(rules: Rules, slot: usize) -> SlotImageOptions<'static> {
     SlotImageOptions {
-        geometry,
+        rules,
         region_address: REGION_ADDRESS,
         region_size: REGION_SIZE,
         slot,
@@ -33,37 +31,40 @@ fn options(geometry: Geometry, slot: usize) -> SlotImageOptions<'static> {
     }
 }
 
-/// A blank flash with the image in it, by its pieces or all of it.
-fn loaded(image: &SlotImage, options: &SlotImageOptions<'_>, whole: bool) -> Regions<MemoryFlash> {
-    let mut regions = blank_regions(options).unwrap();
-    let [slot_0, slot_1] = &mut regions.slots;
-    for region in [&mut regions.factory, slot_0, slot_1] {
-        if whole {
-            region.load(image.address, &image.bytes);
-        } else {
-            for piece in &image.pieces {
-                region.load(piece.address, &piece.bytes);
-            }
+/// A blank flash by these rules with the image in it: its pieces, as a flash tool writes HEX, or all bytes, as it
+/// writes a plain binary.
+fn loaded(image: &SlotImage, rules: Rules, whole: bool) -> SimFlash {
+    let mut contents = vec![rules.erased; REGION_SIZE as usize];
+    let mut programmed = vec![0u8; (REGION_SIZE / rules.unit).div_ceil(8) as usize];
+    let mut put = |address: u32, bytes: &[u8]| {
+        let at = (address - REGION_ADDRESS) as usize;
+        contents[at..at + bytes.len()].copy_from_slice(bytes);
+        let unit = rules.unit as usize;
+        for unit in at / unit..(at + bytes.len()).div_ceil(unit) {
+            programmed[unit / 8] |= 1 << (unit % 8);
+        }
+    };
+    if whole {
+        put(image.address, &image.bytes);
+    } else {
+        for piece in &image.pieces {
+            put(piece.address, &piece.bytes);
         }
     }
-    regions
+    SimFlash::with(rules, &contents, Some(&programmed), 0).unwrap()
 }
 
-/// What a device that starts with this flash says of itself, and how many self-tests of its blob pass.
-fn started(regions: &mut Regions<MemoryFlash>) -> (Status, Option<u32>) {
-    let mut device = Device::new("a device", NoClock);
-    let mut epoch = device.epoch(regions);
-    let Reply::Status(status) = epoch.respond(&Request::Status) else {
-        panic!("no status");
-    };
-    let passed = match epoch.respond(&Request::SelfTest) {
-        Reply::SelfTested(report) => {
-            assert_eq!(report.equal, report.tests, "{report:?}");
-            Some(u32::from(report.equal))
-        }
-        _ => None,
-    };
-    (status, passed)
+/// What the simulated device says of itself that starts with this flash, and how many self-tests of its blob pass; all of
+/// them do, if there is a blob.
+fn started(flash: SimFlash) -> (Status, Option<u16>) {
+    let device = SimulatedDevice::start_with("127.0.0.1:0".parse().unwrap(), flash).unwrap();
+    let mut client = DeviceClient::connect(&format!("tcp:{}", device.address())).unwrap();
+    let status = client.status().unwrap();
+    let report = status.blob.is_ok().then(|| client.self_test().unwrap());
+    if let Some(report) = &report {
+        assert_eq!(report.equal, report.tests, "{report:?}");
+    }
+    (status, report.map(|report| report.equal))
 }
 
 #[test]
@@ -77,12 +78,11 @@ fn a_device_of_every_part_starts_with_its_image() {
         for (slot, serial) in [(0, None), (1, None), (0, Some("SN-0012"))] {
             let options = SlotImageOptions {
                 serial,
-                ..options(part.geometry, slot)
+                ..options(part.rules, slot)
             };
             let image = slot_image(&blob, &options).unwrap();
             for whole in [false, true] {
-                let mut regions = loaded(&image, &options, whole);
-                let (status, passed) = started(&mut regions);
+                let (status, passed) = started(loaded(&image, part.rules, whole));
                 let blob = status
                     .blob
                     .unwrap_or_else(|code| panic!("{part:?}: {code}"));
@@ -96,7 +96,7 @@ fn a_device_of_every_part_starts_with_its_image() {
             let programmed: usize = image.pieces.iter().map(|piece| piece.bytes.len()).sum();
             assert!(programmed < image.bytes.len(), "{part:?}");
             assert!(image.pieces.iter().all(|piece| {
-                let unit = part.geometry.unit;
+                let unit = part.rules.unit;
                 piece.address.is_multiple_of(unit)
                     && (piece.bytes.len() as u32).is_multiple_of(unit)
             }));
@@ -110,18 +110,17 @@ fn an_image_for_another_part_is_refused_with_the_reason() {
     let blob = blob();
     let mut refused = 0;
     for made_for in PARTS {
-        let image = slot_image(&blob, &options(made_for.geometry, 0)).unwrap();
+        let image = slot_image(&blob, &options(made_for.rules, 0)).unwrap();
         for other in PARTS {
-            let is_placed_alike = other.geometry.block == made_for.geometry.block
-                && other.geometry.erased == made_for.geometry.erased;
-            let shapes = [made_for, other].map(|part| Shape::of(part.geometry));
+            let is_placed_alike = other.rules.block == made_for.rules.block
+                && other.rules.erased == made_for.rules.erased;
+            let shapes = [made_for, other].map(|part| part.rules.shape());
             let is_read_alike = shapes[0].blob_start() == shapes[1].blob_start()
                 && shapes[0].blob.line() == shapes[1].blob.line();
             if !is_placed_alike || is_read_alike {
                 continue;
             }
-            let mut regions = loaded(&image, &options(other.geometry, 0), true);
-            let (status, passed) = started(&mut regions);
+            let (status, passed) = started(loaded(&image, other.rules, true));
             assert_eq!(
                 status.blob.err(),
                 Some(OTHER_PART),
@@ -137,20 +136,20 @@ fn an_image_for_another_part_is_refused_with_the_reason() {
 #[test]
 fn what_cannot_be_an_image_is_refused() {
     let blob = blob();
-    let geometry = PARTS[0].geometry;
+    let rules = PARTS[0].rules;
     let refused = |change: &dyn Fn(&mut SlotImageOptions<'_>)| {
-        let mut options = options(geometry, 0);
+        let mut options = options(rules, 0);
         change(&mut options);
         slot_image(&blob, &options).unwrap_err()
     };
     for (unit, block) in [(24, 4096), (1024, 4096), (8, 32), (0, 4096), (8, 0)] {
-        let odd = Geometry {
+        let odd = Rules {
             unit,
             block,
-            ..geometry
+            ..rules
         };
         assert_eq!(
-            refused(&|options| options.geometry = odd),
+            refused(&|options| options.rules = odd),
             SlotImageError::Unsupported(odd)
         );
     }
@@ -159,11 +158,11 @@ fn what_cannot_be_an_image_is_refused() {
         SlotImageError::NotBlocks { .. }
     ));
     assert!(matches!(
-        refused(&|options| options.region_size = 2 * geometry.block),
+        refused(&|options| options.region_size = 2 * rules.block),
         SlotImageError::TooShort { .. }
     ));
     assert!(matches!(
-        refused(&|options| options.region_address = 0u32.wrapping_sub(geometry.block)),
+        refused(&|options| options.region_address = 0u32.wrapping_sub(rules.block)),
         SlotImageError::TooShort { .. }
     ));
     assert_eq!(
@@ -175,19 +174,19 @@ fn what_cannot_be_an_image_is_refused() {
             Some("a serial number that is longer than any record holds")),
         SlotImageError::NoRecord
     );
-    let few = Geometry {
+    let few = Rules {
         block: 256,
-        ..geometry
+        ..rules
     };
     assert!(matches!(
         refused(&|options| {
-            options.geometry = few;
+            options.rules = few;
             options.region_size = 256 * 9;
         }),
         SlotImageError::TooLong { .. } | SlotImageError::TooShort { .. }
     ));
     let mut damaged = blob.clone();
     damaged[100] ^= 1;
-    let error = slot_image(&damaged, &options(geometry, 0)).unwrap_err();
+    let error = slot_image(&damaged, &options(rules, 0)).unwrap_err();
     assert!(matches!(error, SlotImageError::Blob(_)));
 }
