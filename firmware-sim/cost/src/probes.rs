@@ -1,11 +1,12 @@
 //! What the counting images do, whatever they run on: every piece of work between two looks at a counter, for every
 //! match of the job.
 
+use core::cell::RefCell;
 use core::hint::black_box;
 
-use ray_runtime::{PixelPoint, RayBlob, format, triangulate_pair};
+use ray_runtime::{PixelPoint, Ray, RayBlob, Row, format, triangulate_pair};
 
-use crate::counting::{Job, Probe, Record, WRAPPED, job_start};
+use crate::counting::{Job, Probe, ROW_LEN, Record, WRAPPED, job_start};
 
 /// What a probe works on.
 #[derive(Debug)]
@@ -15,6 +16,7 @@ pub struct Task<'a> {
     job: Job<'a>,
     cameras: [usize; 2],
     pixels: [PixelPoint; 2],
+    rays: RefCell<[Ray; ROW_LEN]>,
 }
 
 /// A piece of work; whether it came to a result.
@@ -48,6 +50,7 @@ pub fn run<M: Machine>(machine: &mut M, flash: &[u8]) -> Option<()> {
         job,
         cameras: job.cameras,
         pixels: [PixelPoint::new(0.0, 0.0); 2],
+        rays: RefCell::new([Ray::OUTSIDE; ROW_LEN]),
     };
     for (match_idx, [u1, v1, u2, v2]) in job.matches.iter().enumerate() {
         task.pixels = [PixelPoint::new(*u1, *v1), PixelPoint::new(*u2, *v2)];
@@ -56,6 +59,8 @@ pub fn run<M: Machine>(machine: &mut M, flash: &[u8]) -> Option<()> {
                 continue;
             }
             let (ticks, answered) = ticks_of::<M>(work::<M>(probe), &task);
+            let is_row = matches!(probe, Probe::RowFirst | Probe::RowSecond);
+            let answered = answered && !(is_row && has_outside(&task));
             let stack_bytes = M::stack_bytes_of(work::<M>(probe), &task);
             let record = Record {
                 probe: probe as u32,
@@ -68,6 +73,12 @@ pub fn run<M: Machine>(machine: &mut M, flash: &[u8]) -> Option<()> {
         }
     }
     Some(())
+}
+
+/// Whether a pixel of the row that was looked up last is not calibrated.
+fn has_outside(task: &Task<'_>) -> bool {
+    let rays = task.rays.try_borrow();
+    rays.is_ok_and(|rays| rays.iter().any(Ray::is_outside))
 }
 
 /// Ticks between the look at the counter before a call and the one behind it.
@@ -96,6 +107,8 @@ fn work<M: Machine>(probe: Probe) -> Work {
         Probe::BilinearTriangulate => bilinear_triangulate,
         Probe::BrownUndistortion => brown_undistortion,
         Probe::BrownTriangulate => brown_triangulate,
+        Probe::RowFirst => row_first,
+        Probe::RowSecond => row_second,
     })
 }
 
@@ -157,6 +170,33 @@ fn brown_triangulate(task: &Task<'_>) -> bool {
     let [first, second] = &task.job.browns;
     let rays = (first.ray(task.pixels[0]), second.ray(task.pixels[1]));
     written(&triangulate_pair(&rays.0, &rays.1)).is_ok()
+}
+
+fn row_first(task: &Task<'_>) -> bool {
+    row(task, 0)
+}
+
+fn row_second(task: &Task<'_>) -> bool {
+    row(task, 1)
+}
+
+/// The rays of a row that has the pixel of the match among its own.
+#[inline(always)]
+fn row(task: &Task<'_>, camera: usize) -> bool {
+    let pixel = task.pixels[camera];
+    let first_u = (pixel.u as u32 & !(ROW_LEN as u32 - 1)) as f32;
+    let row = Row {
+        first: PixelPoint::new(first_u, pixel.v as u32 as f32),
+        step_px: 1,
+    };
+    let Ok(mut rays) = task.rays.try_borrow_mut() else {
+        return false;
+    };
+    let found = task
+        .blob
+        .lookup_row(task.cameras[camera], &row, &mut *rays);
+    written(&*rays);
+    found.is_ok()
 }
 
 fn sightings(task: &Task<'_>) -> [(usize, PixelPoint); 2] {

@@ -197,9 +197,10 @@ impl AcrossCores {
 }
 
 /// The columns of the tables across cores: the work, and what stands above it.
-const ACROSS: [(&str, &str); 6] = [
+const ACROSS: [(&str, &str); 7] = [
     ("", "instructions"),
     ("lookup", "lookup"),
+    ("a ray in a row of 64", "a ray in a row of 64"),
     ("triangulate", "triangulate"),
     ("triangulate_with_covariance", "with covariance"),
     ("open", "open"),
