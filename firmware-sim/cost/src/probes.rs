@@ -192,9 +192,7 @@ fn row(task: &Task<'_>, camera: usize) -> bool {
     let Ok(mut rays) = task.rays.try_borrow_mut() else {
         return false;
     };
-    let found = task
-        .blob
-        .lookup_row(task.cameras[camera], &row, &mut *rays);
+    let found = task.blob.lookup_row(task.cameras[camera], &row, &mut *rays);
     written(&*rays);
     found.is_ok()
 }
