@@ -7,7 +7,6 @@ use std::io::Write;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::str::FromStr;
 
 use clap::{Parser, Subcommand};
 use cost::InQemu;
@@ -15,7 +14,8 @@ use firmware_cost::{CORES, Core};
 use firmware_sim::simulated::flash_file::{self, FlashFile};
 use firmware_sim::simulated::host::SimulatedDevice;
 use firmware_sim::simulated::qemu::{self, QemuDevice};
-use firmware_sim::simulated::sim_flash::Rules;
+use firmware_sim::simulated::sim_flash::{BadRules, Rules};
+use firmware_sim::slot_image::Part;
 use ray_device::protocol::{CameraStatus, MAX_CAMERAS_LISTED, MAX_NAME, Rig, name};
 use ray_device::storage::trust::{PublicKey, Trust};
 
@@ -35,12 +35,12 @@ enum Command {
     Host {
         #[command(flatten)]
         device: DeviceArguments,
-        /// The rules of the part that its flash is, with commas between: unit=N and block=N, bytes that are programmed
+        /// The rules of the part that its flash is: a part that slot images are made for, such as stm32h743, or, with commas between, unit=N and block=N, bytes that are programmed
         /// (1 to 512) and erased at once (8 and 4096 if not given); erased=00 or ff; ecc=error or fault: what a
         /// word that a cut of power spoiled does when it is read; blank=fault or undefined: the same of a
         /// blank word; log-block=N: logs lie in regions with erase blocks of their own; erase=none: no erase is
         /// needed; stall-ms=N: how long an erase takes. A flash file keeps its rules.
-        #[arg(long, value_name = "RULES", value_parser = Rules::from_str)]
+        #[arg(long, value_name = "RULES", value_parser = flash_rules)]
         flash_rules: Option<Rules>,
     },
     /// The same application as a Cortex-M4F image in QEMU; the image is built first when it is
@@ -121,6 +121,10 @@ impl DeviceArguments {
         }
         Ok(file)
     }
+}
+
+fn flash_rules(text: &str) -> Result<Rules, BadRules> {
+    Part::of_name(text).map_or_else(|| text.parse(), |part| Ok(part.rules))
 }
 
 fn public_key(text: &str) -> Result<PublicKey, String> {

@@ -104,6 +104,44 @@ fn a_device_of_every_part_starts_with_its_image() {
     }
 }
 
+/// The program `firmware-sim`, told the part's name, with an image written into its flash file as a flash tool would.
+#[cfg(feature = "command")]
+#[test]
+fn the_program_starts_with_an_image_in_its_flash_file() {
+    use crate::running::Running;
+    use firmware_sim::simulated::flash_file::FLASH_LENGTH;
+    use firmware_sim::slot_image::Part;
+    use std::io::{Seek, SeekFrom, Write};
+
+    let blob = blob();
+    for name in ["stm32h743", "stm32l0", "nrf54l", "rp2040"] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("device.flash");
+        let rules = ["--flash-rules", name];
+        let mut empty = Running::keeping("host", &path, &rules);
+        assert!(empty.client().status().unwrap().blob.is_err());
+        empty.process.kill().unwrap();
+        empty.process.wait().unwrap();
+        let options = SlotImageOptions {
+            region_address: 0,
+            region_size: FLASH_LENGTH as u32,
+            ..options(Part::of_name(name).unwrap().rules, 1)
+        };
+        let image = slot_image(&blob, &options).unwrap();
+        let mut file = std::fs::OpenOptions::new().write(true).open(&path).unwrap();
+        for piece in &image.pieces {
+            file.seek(SeekFrom::Start(piece.address.into())).unwrap();
+            file.write_all(&piece.bytes).unwrap();
+        }
+        drop(file);
+        let device = Running::keeping("host", &path, &rules);
+        let mut client = device.client();
+        assert_eq!(client.status().unwrap().active_slot, Some(1), "{name}");
+        let report = client.self_test().unwrap();
+        assert!(report.tests > 0 && report.equal == report.tests, "{name}");
+    }
+}
+
 /// A device whose slots lie where the image's part has them, but which programs in other units, says so.
 #[test]
 fn an_image_for_another_part_is_refused_with_the_reason() {
