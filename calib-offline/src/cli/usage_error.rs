@@ -3,6 +3,7 @@
 use crate::pipeline::NoSuchPose;
 use calib_judge::TaskWordsError;
 use calib_rays::remedy::Remedy;
+use firmware_sim::slot_image::SlotImageError;
 use std::path::PathBuf;
 
 /// A request that cannot be met.

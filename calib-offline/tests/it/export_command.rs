@@ -149,7 +149,7 @@ fn an_image_of_a_slot_is_written_in_every_container() {
     assert_eq!(bin[0x8000..][..blob.len()], blob);
     assert!(bin.starts_with(b"RayD"));
     let (hex, object) = written(&["--slot", "1"]);
-    assert!(hex.starts_with(b":020000040818DA\n:10000000526179"));
+    assert!(hex.starts_with(b":02000004081AD8\n:10000000526179"));
     assert_eq!(object["slot"]["container"], "hex");
     assert!(hex.len() < 4 * blob.len());
     let by_hand = [
