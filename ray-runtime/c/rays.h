@@ -40,6 +40,7 @@ enum {
     RAYS_BAD_PAIR = 13,
     RAYS_BAD_SECTION = 14,
     RAYS_UNKNOWN_SECTION = 15, /* it says what must be understood to answer rightly, and this library does not */
+    RAYS_WRONG_ROUNDING = 16,  /* the processor does not round to nearest: set it so; nothing is wrong with the blob */
 
     /* Why a question has no answer. */
     RAYS_OUTSIDE = 64,         /* a pixel outside of its camera's calibrated area, or not a number */

@@ -49,6 +49,7 @@ enum class code : int {
     bad_pair = RAYS_BAD_PAIR,
     bad_section = RAYS_BAD_SECTION,
     unknown_section = RAYS_UNKNOWN_SECTION,
+    wrong_rounding = RAYS_WRONG_ROUNDING,
     outside = RAYS_OUTSIDE,
     no_such_camera = RAYS_NO_SUCH_CAMERA,
     parallel = RAYS_PARALLEL,
@@ -83,6 +84,7 @@ inline const char *words(code found) noexcept
     case code::bad_pair:
     case code::bad_section: return "the blob is not what its format says";
     case code::unknown_section: return "the blob says what must be understood, and this library does not";
+    case code::wrong_rounding: return "the processor does not round to nearest; nothing is wrong with the blob";
     case code::outside: return "a pixel outside of the calibrated area";
     case code::no_such_camera: return "no such camera";
     case code::parallel: return "the rays are parallel";

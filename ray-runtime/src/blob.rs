@@ -12,6 +12,7 @@ use crate::format::{
 };
 use crate::lookup::Views;
 use crate::match_noise::MatchNoise;
+use crate::rounding::wrong_rounding;
 use crate::self_test::SelfTests;
 use crate::triangulate::{self, Triangulation};
 use crate::uncertainty::{Measurement, Pair};
@@ -66,6 +67,10 @@ impl<'a> RayBlob<'a> {
             return Err(OpenError::Misaligned {
                 offset: misalignment as u8,
             });
+        }
+        // Before any number is checked against what it should be.
+        if let Some(found) = wrong_rounding() {
+            return Err(OpenError::WrongRounding { found });
         }
         let pairs = bytemuck::try_cast_slice(bytes).map_err(|_| OpenError::BadHeader)?;
         let meta_end = HEADER_LEN.saturating_add(header.meta_len as usize);

@@ -4,6 +4,8 @@
 //! One code space for the whole crate: 1 to 63 a blob that does not open, 64 to 127 a question
 //! that has no answer. Codes are never reused.
 
+use crate::rounding::Rounding;
+
 /// Which part of the blob an [`OpenError`] speaks of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Table {
@@ -112,6 +114,12 @@ pub enum OpenError {
         /// Its tag.
         tag: u16,
     },
+    /// The processor does not round to nearest, ties to even, so that its answers would be others. Nothing is wrong
+    /// with the blob: set the mode before it is opened, and leave it.
+    WrongRounding {
+        /// What it does.
+        found: Rounding,
+    },
 }
 
 impl OpenError {
@@ -133,6 +141,7 @@ impl OpenError {
             Self::BadPair { .. } => 13,
             Self::BadSection { .. } => 14,
             Self::UnknownSection { .. } => 15,
+            Self::WrongRounding { .. } => 16,
             Self::FormLeftOut { .. } => 17,
         }
     }
@@ -328,8 +337,11 @@ mod tests {
             OpenError::BadPair { pair: 0 },
             OpenError::BadSection { section: 0 },
             OpenError::UnknownSection { tag: 2 },
+            OpenError::WrongRounding {
+                found: Rounding::TowardZero,
+            },
         ];
-        assert!(open.iter().map(|e| e.code()).eq(1..=15));
+        assert!(open.iter().map(|e| e.code()).eq(1..=16));
         let left_out = OpenError::FormLeftOut {
             camera: 0,
             found: 0,

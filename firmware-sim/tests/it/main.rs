@@ -5,6 +5,7 @@ mod app;
 mod parts;
 mod power_cuts;
 mod rig;
+mod slot_image;
 mod snapshots;
 mod tcp;
 
@@ -12,6 +13,8 @@ mod tcp;
 mod cost;
 #[cfg(feature = "command")]
 mod flashing;
+#[cfg(feature = "command")]
+mod float_modes;
 #[cfg(feature = "command")]
 mod qemu;
 #[cfg(feature = "command")]

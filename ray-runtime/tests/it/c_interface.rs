@@ -3,7 +3,7 @@
 
 use ray_runtime::{
     Aligned, EpipolarCurve, LookupError, MatchNoise, MeasureError, Measurement, OpenError,
-    PixelPoint, ProjectError, Ray, RayBlob, Readout, ReadoutError, SensorWindow, Table,
+    PixelPoint, ProjectError, Ray, RayBlob, Readout, ReadoutError, Rounding, SensorWindow, Table,
     Triangulation,
 };
 use std::path::{Path, PathBuf};
@@ -272,6 +272,12 @@ fn codes_of_the_header_are_those_of_rust() {
         ("BAD_PAIR", OpenError::BadPair { pair: 0 }),
         ("BAD_SECTION", OpenError::BadSection { section: 0 }),
         ("UNKNOWN_SECTION", OpenError::UnknownSection { tag: 0 }),
+        (
+            "WRONG_ROUNDING",
+            OpenError::WrongRounding {
+                found: Rounding::TowardZero,
+            },
+        ),
     ];
     let measure = [
         ("OUTSIDE", MeasureError::Outside { camera: 0 }),

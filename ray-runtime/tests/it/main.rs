@@ -11,3 +11,4 @@ mod rows;
 mod sections;
 mod test_blob;
 mod uncertainty;
+mod varints;
