@@ -119,6 +119,7 @@ impl Pixels {
 fn expected(blob: &RayBlob<'_>) -> (String, usize) {
     let (cameras, tests) = (blob.camera_count(), blob.run_self_tests().unwrap());
     let mut text = format!("cameras {cameras:02x}, self-tests {tests:02x} passed\n");
+    text += &expected_info(blob);
     text += &expected_window(blob);
     let mut pixels = Pixels(1);
     let mut points = 0;
@@ -132,19 +133,26 @@ fn expected(blob: &RayBlob<'_>) -> (String, usize) {
         };
         text += &field(ray.map(of_ray));
 
-        let of_point =
-            |found: Triangulation| [found.point_mm.as_slice(), &[found.gap_squared_mm2]].concat();
         let point = blob.triangulate(first, second);
         points += usize::from(point.is_ok());
         text += &field(point.map(of_point).map_err(MeasureError::code));
         if let (Ok(point), 0) = (point, number % 32) {
-            text += &expected_search(blob, first, &point);
+            text += &expected_search(blob, first, second, &point);
         }
 
         let measured = blob.triangulate_with_covariance(first, second);
         let of_measurement = |measured: Measurement| {
             let sigma_mm = measured.covariance.map(|c| c.sigma_mm().to_vec());
-            [of_point(measured.found), sigma_mm.unwrap_or_default()].concat()
+            let gap = [
+                measured.signed_gap_mm(),
+                measured.covariance.map_or(0.0, |known| known.gap_mm2),
+            ];
+            [
+                of_point(measured.found),
+                sigma_mm.unwrap_or_default(),
+                gap.to_vec(),
+            ]
+            .concat()
         };
         text += &field(measured.map(of_measurement).map_err(MeasureError::code));
         if measured.is_ok() && number % 32 == 0 {
@@ -158,10 +166,27 @@ fn expected(blob: &RayBlob<'_>) -> (String, usize) {
     (text, points)
 }
 
+fn of_point(found: Triangulation) -> Vec<f32> {
+    let [x, y, z] = <[f32; 3]>::from(found.point_mm);
+    vec![x, y, z, found.gap_squared_mm2]
+}
+
+/// What `print_info` must print.
+fn expected_info(blob: &RayBlob<'_>) -> String {
+    let identity = blob.identity().map(|byte| format!("{byte:02x}")).concat();
+    let [error, distance] =
+        [blob.max_error_px(), blob.working_distance_mm()].map(|number| number.to_bits());
+    let length = blob.len();
+    format!(
+        "info | 00 {identity} {error:08x} {distance:08x} {length:08x}, header and library agree\n"
+    )
+}
+
 /// What `print_search` must print.
 fn expected_search(
     blob: &RayBlob<'_>,
     first: (usize, PixelPoint),
+    second: (usize, PixelPoint),
     point: &Triangulation,
 ) -> String {
     let of_pixel = |pixel: PixelPoint| vec![pixel.u, pixel.v];
@@ -180,7 +205,10 @@ fn expected_search(
             .collect()
     };
     let curve = blob.epipolar_curve(first, 1, [100.0, 3000.0], 8);
-    text + &field(curve.map(of_curve).map_err(MeasureError::code))
+    text += &field(curve.map(of_curve).map_err(MeasureError::code));
+    let third = PixelPoint::new(second.1.u + 0.5, second.1.v - 0.25);
+    let nearest = blob.triangulate_many(&[first, second, (1, third)]);
+    text + &field(nearest.map(of_point).map_err(MeasureError::code))
 }
 
 /// What `print_window` must print.
@@ -284,6 +312,7 @@ fn codes_of_the_header_are_those_of_rust() {
         ),
         ("PARALLEL", MeasureError::Parallel),
         ("BEHIND", MeasureError::Behind),
+        ("TOO_FEW_RAYS", MeasureError::TooFewRays { have: 0 }),
     ];
     let others = [
         ("UNSEEN", ProjectError::Unseen.code()),
@@ -313,6 +342,7 @@ fn codes_of_the_header_are_those_of_rust() {
         .collect();
     let mut found: Vec<(String, u8)> = HEADER
         .lines()
+        .filter(|line| line.trim().starts_with("RAYS_"))
         .filter_map(|line| {
             let (name, rest) = line.trim().split_once(" = ")?;
             let code = rest.split([',', ' ']).next()?;
@@ -322,6 +352,18 @@ fn codes_of_the_header_are_those_of_rust() {
     expected.sort();
     found.sort();
     assert_eq!(found, expected);
+}
+
+#[test]
+fn the_version_of_the_header_is_that_of_the_library() {
+    let part = |name: &str| {
+        let line = format!("#define RAYS_VERSION_{name} ");
+        let found = HEADER.lines().find_map(|text| text.strip_prefix(&line));
+        found.unwrap_or_else(|| panic!("no {name}")).to_owned()
+    };
+    let stated = ["MAJOR", "MINOR", "PATCH"].map(part).join(".");
+    let manifest = std::fs::read_to_string(c_folder().join("Cargo.toml")).unwrap();
+    assert!(manifest.contains(&format!("version = \"{stated}\"")), "{stated}");
 }
 
 #[test]
