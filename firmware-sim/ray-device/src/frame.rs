@@ -120,7 +120,12 @@ impl FrameWriter {
 
         let encoded_length = cobs::encode(self.message.get(..length)?, &mut self.frame)?;
         *self.frame.get_mut(encoded_length)? = DELIMITER;
-        self.frame.get(..=encoded_length)
+        self.frame(encoded_length + 1)
+    }
+
+    /// The frame sealed last, whose length it was.
+    pub(crate) fn frame(&self, length: usize) -> Option<&[u8]> {
+        self.frame.get(..length)
     }
 }
 
