@@ -7,6 +7,7 @@ use crate::format::{
 };
 use crate::match_noise::MatchNoise;
 use crate::uncertainty::Pair;
+use crate::vector::Vector;
 
 /// The header, if magic and version are right.
 pub(crate) fn recognized_header(bytes: &[u8]) -> Result<Header, OpenError> {
@@ -178,14 +179,14 @@ pub(crate) fn same_bits(a: Axis, b: Axis) -> bool {
 /// Whether the rows are orthonormal and right-handed to within the round-off of f32 entries.
 pub(crate) fn is_rotation([a, b, c, d, e, f, g, h, i]: [f32; 9]) -> bool {
     const TOLERANCE: f32 = 1e-5;
-    let [x, y, z] = [[a, b, c], [d, e, f], [g, h, i]].map(nalgebra::Vector3::from);
+    let [x, y, z] = [[a, b, c], [d, e, f], [g, h, i]].map(Vector::from);
     // NaN is near nothing.
     let is_near = |value: f32, goal: f32| (goal - TOLERANCE..=goal + TOLERANCE).contains(&value);
     is_near(x.norm_squared(), 1.0)
         && is_near(y.norm_squared(), 1.0)
         && is_near(z.norm_squared(), 1.0)
-        && is_near(x.dot(&y), 0.0)
-        && is_near(y.dot(&z), 0.0)
-        && is_near(z.dot(&x), 0.0)
-        && is_near(x.cross(&y).dot(&z), 1.0)
+        && is_near(x.dot(y), 0.0)
+        && is_near(y.dot(z), 0.0)
+        && is_near(z.dot(x), 0.0)
+        && is_near(x.cross(y).dot(z), 1.0)
 }

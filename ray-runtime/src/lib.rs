@@ -20,6 +20,8 @@ mod grid;
 mod knots;
 mod lookup;
 mod match_noise;
+#[cfg(feature = "nalgebra")]
+mod nalgebra_types;
 mod polynomial;
 mod project;
 mod quantized;
@@ -29,6 +31,7 @@ mod sensor_window;
 mod spline;
 mod triangulate;
 mod uncertainty;
+mod vector;
 mod weights;
 
 pub use aligned::Aligned;

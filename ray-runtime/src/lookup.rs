@@ -4,8 +4,8 @@ use crate::format::{Encoding, Form, OLDEST_VERSION, Record};
 use crate::polynomial::{self, Dual, Number};
 use crate::quantized;
 use crate::spline;
+use crate::vector::Vector;
 use crate::{LookupError, PixelPoint, Ray};
-use nalgebra::Vector3;
 
 /// A blob seen two ways: as bytes, and as pairs of numbers.
 #[derive(Debug, Clone, Copy)]
@@ -194,9 +194,9 @@ pub(crate) struct MovingRay {
 
 impl MovingRay {
     /// How the ray moves at `origin + lambda * direction` with u and with v, mm/px.
-    pub fn shifts_at(&self, lambda: f32) -> [Vector3<f32>; 2] {
+    pub fn shifts_at(&self, lambda: f32) -> [Vector; 2] {
         self.by_pixel
-            .map(|slope| slope.origin_mm + slope.direction * lambda)
+            .map(|slope| Vector::from(slope.origin_mm) + Vector::from(slope.direction) * lambda)
     }
 }
 
@@ -213,7 +213,7 @@ pub(crate) fn ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
 #[inline(always)]
 fn central_ray(record: Record<'_>, s: [f32; 2]) -> Ray {
     Ray {
-        origin_mm: record.translation_mm().into(),
+        origin_mm: record.translation_mm(),
         direction: direction(record.rotation(), s),
     }
 }
@@ -253,29 +253,29 @@ pub(crate) fn is_calibrated(bytes: &[u8], record: Record<'_>, pixel: PixelPoint)
 ///
 /// The third column of the rotation enters by itself and what deviates from it is added last:
 /// one rounding at full magnitude instead of three.
-fn direction(r: [f32; 9], [s1, s2]: [f32; 2]) -> Vector3<f32> {
+fn direction(r: [f32; 9], [s1, s2]: [f32; 2]) -> [f32; 3] {
     let drop = 0.25 * (s1 * s1 + s2 * s2);
-    Vector3::new(
+    [
         r[2] + (r[0] * s1 + r[1] * s2 - r[2] * drop),
         r[5] + (r[3] * s1 + r[4] * s2 - r[5] * drop),
         r[8] + (r[6] * s1 + r[7] * s2 - r[8] * drop),
-    )
+    ]
 }
 
 /// Origin of the ray, mm: the two axes across it, of length `1 + s.s/4`, times the scaled offset
 /// `m / (1 + s.s/4)` that the grid holds, so that nothing is divided.
-fn origin(r: [f32; 9], t: [f32; 3], sample: Sample<f32>) -> Vector3<f32> {
+fn origin(r: [f32; 9], t: [f32; 3], sample: Sample<f32>) -> [f32; 3] {
     let ([s1, s2], [m1, m2]) = (sample.s, sample.n);
     let difference = 0.25 * (s2 * s2 - s1 * s1);
     let product = -0.5 * (s1 * s2);
     let x = m1 + (difference * m1 + product * m2);
     let y = m2 + (product * m1 - difference * m2);
     let z = -(s1 * m1 + s2 * m2);
-    Vector3::new(
+    [
         t[0] + (r[0] * x + r[1] * y + r[2] * z),
         t[1] + (r[3] * x + r[4] * y + r[5] * z),
         t[2] + (r[6] * x + r[7] * y + r[8] * z),
-    )
+    ]
 }
 
 /// How a ray moves when a sample of the control grid changes, both parts per unit of the change:
@@ -294,11 +294,11 @@ fn differential(r: [f32; 9], sample: Sample<f32>, change: Sample<f32>) -> Ray {
     let z = -(s1 * dm1 + s2 * dm2) - (ds1 * m1 + ds2 * m2);
     let drop = 0.5 * (s1 * ds1 + s2 * ds2);
     let turned = |x: f32, y: f32, z: f32| {
-        Vector3::new(
+        [
             r[0] * x + r[1] * y + r[2] * z,
             r[3] * x + r[4] * y + r[5] * z,
             r[6] * x + r[7] * y + r[8] * z,
-        )
+        ]
     };
     Ray {
         origin_mm: turned(x, y, z),
@@ -319,16 +319,16 @@ mod tests {
     #[test]
     fn ninety_degrees_off_axis_looks_sideways_and_its_offset_is_across() {
         let sideways = [2.0, 0.0];
-        assert_eq!(direction(IDENTITY, sideways), Vector3::new(2.0, 0.0, 0.0));
+        assert_eq!(direction(IDENTITY, sideways), [2.0, 0.0, 0.0]);
         // The axes across are -z and y, each of length 2.
         let at = [10.0, 20.0, 30.0];
         assert_eq!(
             origin(IDENTITY, at, sample(sideways, [1.0, 0.0])),
-            Vector3::new(10.0, 20.0, 28.0)
+            [10.0, 20.0, 28.0]
         );
         assert_eq!(
             origin(IDENTITY, at, sample(sideways, [0.0, 1.0])),
-            Vector3::new(10.0, 22.0, 30.0)
+            [10.0, 22.0, 30.0]
         );
     }
 
@@ -351,10 +351,12 @@ mod tests {
             let (low, high) = (at(-h), at(h));
             let found = differential(turn, sampled(start), sampled(change));
             // Origin and direction are quadratic in s: central differences are exact.
-            let error = (high.0 - low.0) / (2.0 * h) - found.origin_mm;
-            assert!(error.norm() < 1e-4, "{channel}: {error}");
-            let error = (high.1 - low.1) / (2.0 * h) - found.direction;
-            assert!(error.norm() < 1e-4, "{channel}: {error}");
+            let error = |high: [f32; 3], low: [f32; 3], found: [f32; 3]| {
+                let difference = Vector::from(high) - low.into();
+                (difference * (0.5 / h) - found.into()).norm_squared()
+            };
+            assert!(error(high.0, low.0, found.origin_mm) < 1e-8, "{channel}");
+            assert!(error(high.1, low.1, found.direction) < 1e-8, "{channel}");
         }
     }
 
@@ -362,11 +364,11 @@ mod tests {
     fn rotation_is_row_major() {
         // x to y, y to z, z to x.
         let turn = [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
-        assert_eq!(direction(turn, [0.0, 0.0]), Vector3::x());
-        assert_eq!(direction(turn, [2.0, 0.0]), Vector3::y() * 2.0);
+        assert_eq!(direction(turn, [0.0, 0.0]), [1.0, 0.0, 0.0]);
+        assert_eq!(direction(turn, [2.0, 0.0]), [0.0, 2.0, 0.0]);
         assert_eq!(
             origin(turn, [0.0; 3], sample([0.0, 0.0], [1.0, 2.0])),
-            Vector3::new(0.0, 1.0, 2.0)
+            [0.0, 1.0, 2.0]
         );
     }
 }

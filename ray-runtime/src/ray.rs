@@ -1,7 +1,5 @@
 //! What goes in and what comes out: a pixel, and the line in space that it sees.
 
-use nalgebra::Vector3;
-
 /// A point on the sensor, px: the center of the top-left pixel is (0, 0), u right, v down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PixelPoint {
@@ -23,7 +21,7 @@ impl PixelPoint {
 pub struct Ray {
     /// The point of the ray nearest to its camera's reference point (its foot point), mm. The
     /// rays of a central camera all start in the same point.
-    pub origin_mm: Vector3<f32>,
+    pub origin_mm: [f32; 3],
     /// From the camera into the scene, not normalized: its length is between 1 and 5.
-    pub direction: Vector3<f32>,
+    pub direction: [f32; 3],
 }

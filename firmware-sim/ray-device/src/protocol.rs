@@ -235,7 +235,7 @@ pub struct Point {
 impl From<Measurement> for Point {
     fn from(measured: Measurement) -> Self {
         Self {
-            point_mm: measured.found.point_mm.into(),
+            point_mm: measured.found.point_mm,
             gap_squared_mm2: measured.found.gap_squared_mm2,
             sigma_mm: measured.covariance.map(|covariance| covariance.sigma_mm()),
         }
