@@ -1,6 +1,7 @@
-//! The C interface of `ray-runtime`; `rays.h` is its documentation and its other half.
+//! The C interface of `ray-runtime`; `rays.h` is its documentation and its other half. `rays_device.h` is that of
+//! [`health`], [`storage`] and [`driver`].
 //!
-//! All `unsafe` of the interface stands in this file. What C must promise is what `rays.h` says: a
+//! All `unsafe` of the interface stands in these four files. What C must promise is what `rays.h` says: a
 //! pointer is null or points to an object of its type, a rig is used only after [`rays_open`], and the
 //! blob stays where it is, unchanged, for as long as its rig is used.
 //!
@@ -9,6 +10,9 @@
 
 #![no_std]
 
+pub mod driver;
+pub mod health;
+pub mod storage;
 mod types;
 
 use core::ffi::c_int;
