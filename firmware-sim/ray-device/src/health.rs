@@ -146,6 +146,7 @@ impl Health {
 
 /// The gaps of what a device has measured.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GapReport {
     /// Points counted, older ones with less weight: see [`FORGET_AT`].
     pub points: u32,
@@ -162,6 +163,7 @@ pub struct GapReport {
 
 /// Gaps beside their predicted standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Predicted {
     /// Points with a prediction.
     pub points: u32,
@@ -177,6 +179,7 @@ pub struct Predicted {
 
 /// What a [`GapReport`] says of the calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Verdict {
     /// The blob says nothing of gaps.
     NothingPredicted,

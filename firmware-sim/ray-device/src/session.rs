@@ -75,6 +75,7 @@ impl Arrived {
 
 /// Why a conversation paused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Paused {
     /// The other side closed the link.
     Closed,

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// Why a frame or a request was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Refusal {
     /// More bytes than a frame may have came without a delimiter.
     Oversized {
@@ -103,6 +104,7 @@ pub enum Refusal {
 
 /// What of a camera, or of the rig, is not the device's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RigPart {
     /// The number of cameras.
     Count,
@@ -118,6 +120,7 @@ pub enum RigPart {
 
 /// What flash can fail to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FlashOperation {
     /// Reading.
     Read,
