@@ -12,9 +12,12 @@ use thiserror::Error;
 
 use crate::simulated::sim_flash::{BLOCK, SimFlash};
 use ray_device::frame::checksum;
+use ray_device::port::NoClock;
 use ray_device::protocol::Rig;
-use ray_device::storage::log::{Log, Record};
-use ray_device::storage::{program, rig};
+use ray_device::storage::log::Log;
+use ray_device::storage::record::Record;
+use ray_device::storage::slot::SlotFlash;
+use ray_device::storage::{program_blob, rig};
 
 /// Size of a device's flash, bytes: that of the board which QEMU emulates.
 pub const FLASH_LENGTH: usize = 16 << 20;
@@ -96,7 +99,8 @@ pub fn blank(own: Option<&Rig>) -> Result<SimFlash, FlashFileError> {
     let flash = SimFlash::blank(FLASH_LENGTH / BLOCK, 0);
     let mut flash = flash.ok_or(FlashFileError::Rig)?;
     if let Some(own) = own {
-        rig::write(&mut flash.regions().factory, own).map_err(|_| FlashFileError::Rig)?;
+        rig::write(&mut flash.regions().factory, own, &mut NoClock)
+            .map_err(|_| FlashFileError::Rig)?;
     }
     Ok(flash)
 }
@@ -113,21 +117,23 @@ pub fn holding(blob: &[u8], own: Option<&Rig>) -> Result<SimFlash, FlashFileErro
     if blob.is_empty() {
         return Ok(flash);
     }
+    let [slot, _] = &mut flash.regions().slots;
+    let limit = slot.max_blob(0) as usize;
     let too_long = FlashFileError::TooLong {
         length: blob.len(),
-        limit: flash.layout().max_blob() as usize,
+        limit,
     };
-    if blob.len() > flash.layout().max_blob() as usize {
+    if blob.len() > limit {
         return Err(too_long);
     }
-    let [slot, _] = &mut flash.regions().slots;
     let record = Record {
         sequence: 1,
         length: blob.len() as u32,
         checksum: checksum(blob),
+        ..Record::default()
     };
-    program(slot, BLOCK as u32, blob)
-        .and_then(|()| Log::commit(slot, record))
+    program_blob(slot, 0, blob, &mut NoClock)
+        .and_then(|()| Log::commit(slot, &record, &mut NoClock))
         .map_err(|_| too_long)?;
     Ok(flash)
 }

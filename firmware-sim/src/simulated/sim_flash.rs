@@ -22,12 +22,15 @@ use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase, check_write,
 };
 
-use ray_device::port::{MappedFlash, Regions, UNIT};
-use ray_device::storage::Layout;
+use ray_device::port::{Flash, Geometry, MappedFlash, Regions};
+use ray_device::storage::layout::Layout;
 use split_mix::SplitMix;
 
 /// Length of an erase block, bytes.
 pub const BLOCK: usize = 4096;
+
+/// Length of a program unit, bytes.
+pub const UNIT: usize = 8;
 
 /// What a cut of power leaves of the operation it hits. All bytes before the cut are done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -139,7 +142,10 @@ impl SimFlash {
         if !contents.len().is_multiple_of(BLOCK) {
             return None;
         }
-        let layout = Layout::of(u32::try_from(contents.len()).ok()?, BLOCK as u32)?;
+        let layout = Layout::of(
+            u32::try_from(contents.len()).ok()?,
+            Geometry::of::<SimRegion<'_>>(),
+        )?;
         let mut words = vec![0; contents.len() / UNIT];
         bytemuck::cast_slice_mut(&mut words).copy_from_slice(contents);
         let chip = Chip {
@@ -236,10 +242,10 @@ impl SimFlash {
 
     /// Its regions, each with a driver of its own.
     pub fn regions(&mut self) -> Regions<SimRegion<'_>> {
-        let Layout { block, slot } = self.layout;
+        let Layout { factory, slot } = self.layout;
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut self.words);
         // The layout was made for this length.
-        let (factory, rest) = bytes.split_at_mut(block as usize);
+        let (factory, rest) = bytes.split_at_mut(factory as usize);
         let (slot_0, rest) = rest.split_at_mut(slot as usize);
         let (slot_1, _) = rest.split_at_mut(slot as usize);
         let chip = &self.chip;
@@ -262,9 +268,15 @@ pub struct SimRegion<'a> {
     chip: &'a RefCell<Chip>,
 }
 
+impl Flash for SimRegion<'_> {
+    fn start(&self) -> u32 {
+        self.start as u32
+    }
+}
+
 impl MappedFlash for SimRegion<'_> {
-    fn mapped(&self) -> &[u8] {
-        self.bytes
+    fn mapped(&self, start: u32, length: u32) -> Option<&[u8]> {
+        self.bytes.get(start as usize..)?.get(..length as usize)
     }
 }
 

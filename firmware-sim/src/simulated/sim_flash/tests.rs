@@ -2,8 +2,8 @@
 
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 
-use super::{BLOCK, Cut, PowerCut, SimFlash, SimFlashError};
-use ray_device::port::{MappedFlash, UNIT};
+use super::{BLOCK, Cut, PowerCut, SimFlash, SimFlashError, UNIT};
+use ray_device::port::MappedFlash;
 
 fn flash() -> SimFlash {
     SimFlash::blank(5, 1).unwrap()
@@ -29,7 +29,7 @@ fn units_are_programmed_whole_in_place_and_once() {
     );
     assert_eq!(slot.write(8, &[5; 16]), Ok(()));
     assert_eq!(
-        slot.mapped()[7..25],
+        slot.mapped(0, 25).unwrap()[7..],
         [&[0xff][..], &[5; 16], &[0xff]].concat()
     );
     assert_eq!(slot.write(16, &[5; 8]), Err(SimFlashError::NotErased));
@@ -59,7 +59,7 @@ fn without_power_nothing_works() {
     flash.power_up();
     let expected = [[0; 11].as_slice(), &[0xff; 13]].concat();
     let [slot, _] = &mut flash.regions().slots;
-    assert_eq!(slot.mapped()[..24], expected);
+    assert_eq!(*slot.mapped(0, 24).unwrap(), expected);
 }
 
 #[test]
@@ -76,7 +76,7 @@ fn a_weak_unit_reads_differently_until_it_is_erased() {
     let reads: Vec<_> = (0..20).map(|_| read(&mut flash, 0)).collect();
     assert!(reads.iter().all(|unit| unit[..4] == [0; 4]));
     assert!(reads.iter().any(|unit| *unit != reads[0]));
-    let mapped = |flash: &mut SimFlash| flash.regions().slots[0].mapped()[..8].to_vec();
+    let mapped = |flash: &mut SimFlash| flash.regions().slots[0].mapped(0, 8).unwrap().to_vec();
     let first = mapped(&mut flash);
     assert_eq!(mapped(&mut flash), first, "the mapping keeps still");
     let [slot, _] = &mut flash.regions().slots;
@@ -102,8 +102,8 @@ fn a_torn_erase_leaves_some_bits() {
     let _ = slot.erase(0, BLOCK as u32);
     flash.power_up();
     let [slot, _] = &mut flash.regions().slots;
-    assert_eq!(slot.mapped()[..100], [0xff; 100]);
-    let ones: u32 = slot.mapped()[100..BLOCK]
+    assert_eq!(*slot.mapped(0, 100).unwrap(), [0xff; 100]);
+    let ones: u32 = slot.mapped(0, BLOCK as u32).unwrap()[100..]
         .iter()
         .map(|b| b.count_ones())
         .sum();
