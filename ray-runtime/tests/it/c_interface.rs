@@ -363,7 +363,10 @@ fn the_version_of_the_header_is_that_of_the_library() {
     };
     let stated = ["MAJOR", "MINOR", "PATCH"].map(part).join(".");
     let manifest = std::fs::read_to_string(c_folder().join("Cargo.toml")).unwrap();
-    assert!(manifest.contains(&format!("version = \"{stated}\"")), "{stated}");
+    assert!(
+        manifest.contains(&format!("version = \"{stated}\"")),
+        "{stated}"
+    );
 }
 
 #[test]
