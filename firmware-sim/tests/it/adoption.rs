@@ -81,7 +81,11 @@ fn a_crate_that_stands_alone_inherits_nothing_and_says_the_same() {
         let inherited: Vec<_> = package
             .iter()
             .chain(dependencies(&manifest))
-            .chain([("lints".to_owned(), manifest["lints"].clone())].iter().map(|(a, b)| (a, b)))
+            .chain(
+                [("lints".to_owned(), manifest["lints"].clone())]
+                    .iter()
+                    .map(|(a, b)| (a, b)),
+            )
             .filter(|(_, value)| inherits(value))
             .map(|(name, _)| name)
             .collect();
@@ -108,7 +112,9 @@ fn every_dependency_has_one_version() {
             };
             compared += 1;
             if found != expected {
-                wrong.push(format!("{folder}: {name} {found}, the workspace has {expected}"));
+                wrong.push(format!(
+                    "{folder}: {name} {found}, the workspace has {expected}"
+                ));
             }
         }
     }
@@ -121,10 +127,19 @@ fn what_a_registry_and_its_readers_want_is_there() {
     for folder in ["ray-runtime", "firmware-sim/ray-device"] {
         let manifest = manifest(folder);
         let package = manifest["package"].as_table().unwrap();
-        for key in ["description", "documentation", "readme", "rust-version", "include"] {
+        for key in [
+            "description",
+            "documentation",
+            "readme",
+            "rust-version",
+            "include",
+        ] {
             assert!(package.contains_key(key), "{folder}: {key}");
         }
-        assert!(!package.contains_key("publish"), "{folder} can be published");
+        assert!(
+            !package.contains_key("publish"),
+            "{folder} can be published"
+        );
         for (key, most) in [("keywords", 5), ("categories", 5)] {
             let count = package[key].as_array().unwrap().len();
             assert!((1..=most).contains(&count), "{folder}: {count} {key}");
@@ -132,7 +147,11 @@ fn what_a_registry_and_its_readers_want_is_there() {
         let docs = &package["metadata"]["docs"]["rs"];
         assert_eq!(docs["all-features"].as_bool(), Some(true), "{folder}");
         for name in ["LICENSE-MIT", "LICENSE-APACHE"] {
-            assert_eq!(text(&format!("{folder}/{name}")), text(name), "{folder}: {name}");
+            assert_eq!(
+                text(&format!("{folder}/{name}")),
+                text(name),
+                "{folder}: {name}"
+            );
         }
     }
     // ray-device asks a registry for the ray-runtime that stands beside it.
@@ -143,7 +162,10 @@ fn what_a_registry_and_its_readers_want_is_there() {
     );
     let example = fs::read(root().join("ray-runtime/example.rays")).unwrap();
     let golden = fs::read(root().join("data/golden/stereo-v3-small.rays")).unwrap();
-    assert!(example == golden, "ray-runtime/example.rays is a copy of the golden blob");
+    assert!(
+        example == golden,
+        "ray-runtime/example.rays is a copy of the golden blob"
+    );
 }
 
 /// The value behind `key` and what parts the two.
@@ -159,14 +181,25 @@ fn the_packages_of_the_c_library_name_files_and_versions_that_are_there() {
     let version = version.as_str().unwrap();
     // Arduino: keys that its library specification asks for.
     let arduino = text("ray-runtime/c/arduino/library.properties");
-    for key in ["name", "author", "maintainer", "sentence", "paragraph", "category", "url"] {
+    for key in [
+        "name",
+        "author",
+        "maintainer",
+        "sentence",
+        "paragraph",
+        "category",
+        "url",
+    ] {
         let _ = value(&arduino, key, '=');
     }
     assert_eq!(value(&arduino, "version", '='), version);
     assert_eq!(value(&arduino, "category", '='), "Data Processing");
     assert_eq!(value(&arduino, "precompiled", '='), "full");
     for header in value(&arduino, "includes", '=').split(',') {
-        assert!(root().join("ray-runtime/c").join(header.trim()).exists(), "{header}");
+        assert!(
+            root().join("ray-runtime/c").join(header.trim()).exists(),
+            "{header}"
+        );
     }
     let package = text("ray-runtime/c/arduino/package.sh");
     let flags = value(&arduino, "ldflags", '=');

@@ -136,7 +136,9 @@ impl MappedFlash for Driver {
         }
         // SAFETY: within the bytes that can be read there, says whoever made the driver; `self` is borrowed for as long as
         // they are, so that nothing is programmed or erased meanwhile.
-        Some(unsafe { core::slice::from_raw_parts(self.mapped.add(start as usize), length as usize) })
+        Some(unsafe {
+            core::slice::from_raw_parts(self.mapped.add(start as usize), length as usize)
+        })
     }
 }
 

@@ -140,7 +140,10 @@ pub unsafe extern "C" fn rays_storage_blob(
 /// # Safety
 /// As `rays_device.h` says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn rays_storage_max_blob(storage: *const Storage, length: *mut usize) -> c_int {
+pub unsafe extern "C" fn rays_storage_max_blob(
+    storage: *const Storage,
+    length: *mut usize,
+) -> c_int {
     if length.is_null() {
         return BAD_ARGUMENT;
     }
@@ -221,7 +224,7 @@ impl Started {
     }
 
     /// The slot that may be written, its watchdog, and its record.
-    fn to_write(&mut self) -> Result<(&mut Driver, Steps, &mut Option<Record>), c_int> {
+    fn inactive_slot(&mut self) -> Result<(&mut Driver, Steps, &mut Option<Record>), c_int> {
         let inactive = self.inactive();
         // Neither can fail: there are two of each.
         let slot = self.regions.slots.get_mut(inactive).ok_or(BAD_FLASH)?;
@@ -250,7 +253,7 @@ impl Started {
             return Err(TOO_LONG);
         }
         self.update = None;
-        let (slot, mut steps, record) = self.to_write()?;
+        let (slot, mut steps, record) = self.inactive_slot()?;
         *record = None;
         erase_log(slot, &mut steps).map_err(code_of)?;
         self.update = Some(Update {
@@ -262,7 +265,7 @@ impl Started {
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), c_int> {
         let update = self.update.ok_or(NO_UPDATE)?;
-        let (slot, mut steps, _) = self.to_write()?;
+        let (slot, mut steps, _) = self.inactive_slot()?;
         let length = u32::try_from(bytes.len()).map_err(|_| BAD_CHUNK)?;
         let missing = update.length.saturating_sub(update.received);
         let line = slot.shape().blob.line();
@@ -289,7 +292,7 @@ impl Started {
         self.update = None;
         let sequence = self.next_sequence.ok_or(LOG_FULL)?;
         let claims = self.claims;
-        let (slot, mut steps, _) = self.to_write()?;
+        let (slot, mut steps, _) = self.inactive_slot()?;
         let record = Record {
             sequence,
             length: update.length,
@@ -307,7 +310,7 @@ impl Started {
         }
         let sequence = self.next_sequence.ok_or(LOG_FULL)?;
         let claims = self.claims;
-        let (slot, mut steps, record) = self.to_write()?;
+        let (slot, mut steps, record) = self.inactive_slot()?;
         let record = record.ok_or(NOTHING_TO_ROLL_BACK_TO)?;
         let record = Record {
             sequence,
@@ -323,7 +326,7 @@ impl Started {
     /// Makes the inactive slot's blob count, and the slot the active one.
     fn commit(&mut self, record: Record) -> Result<(), c_int> {
         let inactive = self.inactive();
-        let (slot, mut steps, place) = self.to_write()?;
+        let (slot, mut steps, place) = self.inactive_slot()?;
         Log::commit(slot, &record, &mut steps).map_err(code_of)?;
         *place = Some(record);
         self.active = Some(u8::from(inactive != 0));
