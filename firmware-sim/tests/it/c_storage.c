@@ -219,6 +219,7 @@ static int mistakes(void)
     rules.slot = 1 << 15;
     rules.erased = 0xff;
     rules.no_erase = rules.blank_fails = 0;
+    operations_left = -1;
     new_flash();
     memset(&storage, 0, sizeof storage);
     EXPECT(rays_storage_blob(&storage, &blob, &length), RAYS_NOT_OPEN);

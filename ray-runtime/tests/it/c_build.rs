@@ -75,6 +75,7 @@ pub(crate) const CORTEX_M4F: Arm = Arm {
     machine: ["mps2-an386", "cortex-m4"],
 };
 
+#[allow(dead_code, reason = "not every program of tests has a use for each")]
 pub(crate) const CORTEX_M4: Arm = Arm {
     target: "thumbv7em-none-eabi",
     flags: &["-mcpu=cortex-m4", "-mfloat-abi=soft"],

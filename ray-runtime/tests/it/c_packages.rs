@@ -74,6 +74,12 @@ fn build_and_check(project: &Path) {
     check_bits(|blob| succeed(Command::new(&program).arg(blob)));
 }
 
+/// What CMake said, which it breaks into lines where it likes to.
+fn in_one_line(said: &[u8]) -> String {
+    let said = String::from_utf8_lossy(said);
+    said.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 #[test]
 fn a_project_finds_the_installed_package() {
     let Some(prefix) = install("cmake") else {
@@ -104,7 +110,7 @@ fn a_project_takes_the_folder_in_and_cargo_builds() {
     let wrong = ["-DRAYS_LIBRARY=/nowhere/librays.a".to_owned()];
     let _ = std::fs::remove_dir_all(theirs.join("build"));
     let output = run(&mut configure(&theirs, &wrong));
-    let said = String::from_utf8_lossy(&output.stderr).replace('\n', " ");
+    let said = in_one_line(&output.stderr);
     assert!(
         !output.status.success() && said.contains("which is not there"),
         "{said}"
@@ -188,23 +194,13 @@ fn the_zephyr_module_chooses_the_target_by_the_board() {
         let said = String::from_utf8_lossy(&output.stdout).into_owned();
         assert!(output.status.success(), "{name}: {output:?}");
         assert!(said.contains("links rays::rays"), "{name}: {said}");
-        let cache = made(&format!("zephyr-{name}")).join("build");
-        let made_by = std::fs::read_to_string(cache.join("CMakeFiles/Makefile2"))
-            .or_else(|_| std::fs::read_to_string(cache.join("build.ninja")))
-            .unwrap();
-        let rules =
-            std::fs::read_to_string(cache.join("module/rays/CMakeFiles/rays_cargo.dir/build.make"))
-                .unwrap_or(made_by);
-        assert!(
-            rules.contains(&format!("--target {target}\n"))
-                || rules.contains(&format!("--target {target} ")),
-            "{name}: {rules}"
-        );
+        let target = format!("cargo builds for target \"{target}\"");
+        assert!(said.contains(&target), "{name}: {said}");
     }
     let library = format!("set(RAYS_LIBRARY {})", archive.display());
     assert!(try_board("own", &library).status.success());
     let output = try_board("unknown", "");
-    let said = String::from_utf8_lossy(&output.stderr).replace('\n', " ");
+    let said = in_one_line(&output.stderr);
     assert!(
         !output.status.success() && said.contains("set RAYS_RUST_TARGET"),
         "{said}"
