@@ -46,7 +46,7 @@ impl Clock for Uptime {
 }
 
 #[embassy_executor::main]
-async fn main(_: Spawner) -> ! {
+async fn main(_spawner: Spawner) -> ! {
     let board = embassy_rp::init(embassy_rp::config::Config::default());
     let slots = flash::slots(board.FLASH);
     let mut regions = Regions {

@@ -2,6 +2,8 @@
 #![allow(unsafe_code)]
 
 use cortex_m::interrupt::InterruptNumber;
+// The vectors of the core and the start-up code.
+use cortex_m_rt as _;
 
 /// Bits of a priority in the AN386 image.
 pub const NVIC_PRIO_BITS: u8 = 3;
@@ -15,6 +17,9 @@ pub enum Interrupt {
     /// A frame has been matched: an interrupt that is free on this board stands for that of a camera.
     CAMERA = 1,
 }
+
+/// The name that generated crates of registers give it, too.
+pub use self::Interrupt as interrupt;
 
 // SAFETY: both are below the 32 that the NVIC of AN386 has.
 unsafe impl InterruptNumber for Interrupt {
