@@ -84,25 +84,35 @@ impl<C: Clock> Device<C> {
         self.health = Health::new();
         let booted = storage::boot(regions, &mut self.clock);
         let rig = regions.factory.rig();
-        let [slot_0, slot_1] = &mut regions.slots;
+        let Regions {
+            factory,
+            slots: [slot_0, slot_1],
+        } = regions;
+        let factory = factory.blob();
         let [record_0, record_1] = booted.records;
         let sequence = |record: Option<Record>| record.map_or(0, |record| record.sequence);
         let is_0_older = sequence(record_0) <= sequence(record_1);
         let (active, inactive, inactive_index) = match booted.active {
             Some(0) => (record_0.map(|record| (&*slot_0, record)), slot_1, 1),
-            Some(_) => (record_1.map(|record| (&*slot_1, record)), slot_0, 0),
+            Some(1) => (record_1.map(|record| (&*slot_1, record)), slot_0, 0),
             // The one with less in it: the newest record's claims stay.
-            None if is_0_older => (None, slot_0, 0),
-            None => (None, slot_1, 1),
+            _ if is_0_older => (None, slot_0, 0),
+            _ => (None, slot_1, 1),
         };
-        let stored = booted.slots.into_iter().find_map(|state| match state {
-            SlotState::Holds(stored) if Some(usize::from(stored.slot)) == booted.active => {
+        let stored = match (booted.active, booted.slots) {
+            (Some(0), [SlotState::Holds(stored), _]) | (Some(1), [_, SlotState::Holds(stored)]) => {
                 Some(stored)
             }
+            (Some(storage::FACTORY), _) => storage::factory_blob(factory),
             _ => None,
-        });
-        let blob = match active {
-            Some((slot, record)) => storage::open_verified(slot, &record).map_err(OpenError::code),
+        };
+        let blob = match (active, stored) {
+            (Some((slot, record)), _) => storage::open_of(slot, factory, &record),
+            (None, Some(_)) => storage::open_factory(factory),
+            (None, None) => Err(storage::NO_BLOB),
+        };
+        let blob = match stored {
+            Some(_) => blob.map_err(OpenError::code),
             None => Err(booted.open_error),
         };
         Epoch {
@@ -113,6 +123,7 @@ impl<C: Clock> Device<C> {
             slots: booted.slots,
             inactive,
             inactive_index,
+            factory,
             inactive_record: if inactive_index == 0 {
                 record_0
             } else {
@@ -135,6 +146,7 @@ pub struct Epoch<'e, S, C> {
     slots: [SlotState; 2],
     inactive: &'e mut S,
     inactive_index: usize,
+    factory: Option<&'e [u8]>,
     inactive_record: Option<Record>,
     claims: Claims,
     next_sequence: Option<u32>,
@@ -319,11 +331,11 @@ impl<'e, S: SlotFlash, C: Clock> Epoch<'e, S, C> {
         if let Some(transfer) = &self.device.transfer {
             transfer.make_way(peer, self.device.clock.uptime_ms())?;
         }
-        let (Some(SlotState::Holds(stored)), Some(record)) = (
-            self.slots.get(self.inactive_index).copied(),
-            self.inactive_record,
-        ) else {
-            return Err(Refusal::NothingToRollBackTo);
+        let state = self.slots.get(self.inactive_index).copied();
+        let (stored, record) = match (state, self.inactive_record) {
+            (Some(SlotState::Holds(stored)), Some(record)) => (stored, record),
+            // Nothing else is there.
+            _ => (self.factory_to_roll_back_to()?, Record::default()),
         };
         let sequence = self.next_sequence.ok_or(Refusal::LogFull)?;
         let record = Record {
@@ -333,9 +345,11 @@ impl<'e, S: SlotFlash, C: Clock> Epoch<'e, S, C> {
         };
         // It was whole when the device started; bits may have flipped since.
         let clock = &mut self.device.clock;
-        let blob = storage::verify(self.inactive, &record, clock)
-            .and_then(|()| storage::open_verified(self.inactive, &record))
-            .map_err(|_| Refusal::NothingToRollBackTo)?;
+        let is_whole = record.length == 0 || storage::verify(self.inactive, &record, clock).is_ok();
+        let blob = storage::open_of(&*self.inactive, self.factory, &record)
+            .ok()
+            .filter(|_| is_whole)
+            .ok_or(Refusal::NothingToRollBackTo)?;
         if let Some(own) = &self.rig {
             rig::compare(&blob, own)?;
         }
@@ -343,6 +357,20 @@ impl<'e, S: SlotFlash, C: Clock> Epoch<'e, S, C> {
         self.device.rollbacks = self.device.rollbacks.saturating_add(1);
         self.is_over = true;
         Ok(Reply::Active(StoredBlob { sequence, ..stored }))
+    }
+}
+
+impl<S: SlotFlash, C: Clock> Epoch<'_, S, C> {
+    /// The factory's blob, unless it is in use.
+    fn factory_to_roll_back_to(&self) -> Result<StoredBlob, Refusal> {
+        let stored = storage::factory_blob(self.factory).ok_or(Refusal::NothingToRollBackTo)?;
+        match self.active {
+            Some(active) if active.checksum != stored.checksum => Ok(StoredBlob {
+                slot: self.inactive_index as u8,
+                ..stored
+            }),
+            _ => Err(Refusal::NothingToRollBackTo),
+        }
     }
 }
 

@@ -155,7 +155,7 @@ pub struct Chunk {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StoredBlob {
-    /// Which slot, 0 or 1.
+    /// Which slot, 0 or 1; 2: none, the device's factory blob is in use.
     pub slot: u8,
     /// Of its commit record: the highest is the active one.
     pub sequence: u32,
@@ -299,7 +299,7 @@ pub struct Status {
     /// The blob in use, or the stable code of the runtime's `OpenError` that says why there is
     /// none.
     pub blob: Result<BlobStatus, u8>,
-    /// Which slot it is in.
+    /// Which slot it is in; 2: the device's factory blob.
     pub active_slot: Option<u8>,
     /// What each slot holds.
     pub slots: [SlotState; 2],

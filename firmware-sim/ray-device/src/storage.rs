@@ -135,6 +135,7 @@ use ray_runtime::{OpenError, RayBlob};
 use crate::port::{Clock, Flash, Geometry, MappedFlash, Regions};
 use crate::protocol::{Refusal, SlotState, StoredBlob};
 use access::{checksum, erase, program};
+use factory::{FACTORY_SLOT, Factory};
 use layout::aligned;
 use log::{Log, erase_log};
 use record::{Claims, Record};
@@ -187,15 +188,22 @@ pub const OTHER_PART: u8 = 128;
 ///
 /// It never fails: flash that cannot be written leaves the decision as it is.
 #[inline(never)]
-pub fn boot<S: SlotFlash, F, C: Clock>(regions: &mut Regions<S, F>, clock: &mut C) -> Booted {
+pub fn boot<S: SlotFlash, F: Factory, C: Clock>(
+    regions: &mut Regions<S, F>,
+    clock: &mut C,
+) -> Booted {
     require_supported::<S::Log>();
     require_supported::<S::Blob>();
-    let [slot_0, slot_1] = &mut regions.slots;
+    let Regions {
+        factory,
+        slots: [slot_0, slot_1],
+    } = regions;
+    let factory = factory.blob();
     let logs = [settle(slot_0, clock), settle(slot_1, clock)];
     let mut records = logs.map(|log| log.record());
     let mut slots = [
-        inspect(0, slot_0, &logs[0], clock),
-        inspect(1, slot_1, &logs[1], clock),
+        inspect(0, slot_0, &logs[0], factory, clock),
+        inspect(1, slot_1, &logs[1], factory, clock),
     ];
     let newest = match records {
         [Some(a), Some(b)] if b.sequence > a.sequence => Some(b),
@@ -203,35 +211,48 @@ pub fn boot<S: SlotFlash, F, C: Clock>(regions: &mut Regions<S, F>, clock: &mut 
         [None, b] => b,
     }
     .unwrap_or_default();
-    let active = match held(&slots) {
+    let mut active = match held(&slots) {
         [Some(a), Some(b)] if b.sequence > a.sequence => Some((1, b)),
         [Some(a), _] => Some((0, a)),
         [None, Some(b)] => Some((1, b)),
-        [None, None] => None,
+        [None, None] => factory_blob(factory).map(|stored| (FACTORY, stored)),
     };
     let mut next_sequence = newest.sequence.checked_add(1);
-    if let (Some((slot, stored)), Some(next)) = (active, next_sequence)
+    if let (Some((used, stored)), Some(next)) = (active, next_sequence)
         && newest.sequence > stored.sequence
     {
-        // The newest blob was damaged. Should it read well again one day, it must not come back.
+        // The newest blob was damaged. Should it read well again one day, it must not come back. The factory's is
+        // noted in the log of that one.
+        let slot = match (used, &records) {
+            (FACTORY, [Some(record), _]) if *record == newest => 0,
+            (FACTORY, _) => 1,
+            (slot, _) => slot,
+        };
         let (region, record, state) = match (slot, &mut records, &mut slots) {
             (0, [record, _], [state, _]) => (slot_0, record, state),
             (_, [_, record], [_, state]) => (slot_1, record, state),
         };
+        let again = match *record {
+            Some(record) if used != FACTORY => record,
+            _ => Record::default(),
+        };
         let again = Record {
             sequence: next,
             claims: newest.claims,
-            ..record.unwrap_or_default()
+            ..again
         };
         if Log::read(region, clock)
             .append(region, &again, clock)
             .is_ok()
         {
             *record = Some(again);
-            *state = SlotState::Holds(StoredBlob {
+            let stored = StoredBlob {
+                slot: slot as u8,
                 sequence: next,
                 ..stored
-            });
+            };
+            *state = SlotState::Holds(stored);
+            active = Some((slot, stored));
             next_sequence = next.checked_add(1);
         }
     }
@@ -243,6 +264,36 @@ pub fn boot<S: SlotFlash, F, C: Clock>(regions: &mut Regions<S, F>, clock: &mut 
         open_error: open_error(slots),
         next_sequence,
     }
+}
+
+/// In place of a slot: the factory's blob, without a record that says so.
+pub const FACTORY: usize = FACTORY_SLOT as usize;
+
+/// Why there is nothing to open: nothing was ever stored.
+pub const NO_BLOB: OpenError = OpenError::BadMagic { found: u32::MAX };
+
+/// The factory's blob, with a look at all of it.
+///
+/// # Errors
+/// Any [`OpenError`]; [`NO_BLOB`] if there is none.
+#[inline(never)]
+pub fn open_factory(factory: Option<&[u8]>) -> Result<RayBlob<'_>, OpenError> {
+    let bytes = factory.ok_or(NO_BLOB)?;
+    RayBlob::open_with_crc_of_all(bytes, crate::frame::checksum(bytes))
+}
+
+/// What is to be said of the factory's blob, if there is one and it can be used.
+#[inline(never)]
+pub fn factory_blob(factory: Option<&[u8]>) -> Option<StoredBlob> {
+    let bytes = factory?;
+    let blob = open_factory(factory).ok()?;
+    Some(StoredBlob {
+        slot: FACTORY_SLOT,
+        sequence: 0,
+        length: bytes.len() as u32,
+        checksum: crate::frame::checksum(bytes),
+        identity: *blob.identity(),
+    })
 }
 
 /// The blobs that can be used.
@@ -273,7 +324,13 @@ fn settle<S: SlotFlash, C: Clock>(slot: &mut S, clock: &mut C) -> Log {
 
 /// What a slot holds, by its log.
 #[inline(never)]
-fn inspect<S: SlotFlash, C: Clock>(index: u8, slot: &mut S, log: &Log, clock: &mut C) -> SlotState {
+fn inspect<S: SlotFlash, C: Clock>(
+    index: u8,
+    slot: &mut S,
+    log: &Log,
+    factory: Option<&[u8]>,
+    clock: &mut C,
+) -> SlotState {
     let Some(record) = log.record() else {
         return SlotState::Empty;
     };
@@ -283,6 +340,16 @@ fn inspect<S: SlotFlash, C: Clock>(index: u8, slot: &mut S, log: &Log, clock: &m
     };
     if !log.is_of_this_part() {
         return unusable(OTHER_PART);
+    }
+    if record.length == 0 {
+        return match factory_blob(factory) {
+            Some(stored) => SlotState::Holds(StoredBlob {
+                slot: index,
+                sequence: record.sequence,
+                ..stored
+            }),
+            None => unusable(NO_BLOB.code()),
+        };
     }
     if let Err(error) = verify(slot, &record, clock) {
         return unusable(error.code());
@@ -365,6 +432,22 @@ pub fn open_verified<'a, S: SlotFlash>(
     RayBlob::open_with_crc_of_all(blob_bytes(slot, record)?, record.checksum)
 }
 
+/// The same, or the factory's blob if the record says that.
+///
+/// # Errors
+/// Any [`OpenError`].
+pub fn open_of<'a, S: SlotFlash>(
+    slot: &'a S,
+    factory: Option<&'a [u8]>,
+    record: &Record,
+) -> Result<RayBlob<'a>, OpenError> {
+    if record.length == 0 {
+        open_factory(factory)
+    } else {
+        open_verified(slot, record)
+    }
+}
+
 /// The bytes of a record's blob, for whoever has [verified](verify) them.
 ///
 /// # Errors
@@ -440,7 +523,7 @@ fn open_error(slots: [SlotState; 2]) -> u8 {
             sequence,
             open_error,
         } => (sequence, open_error),
-        _ => (0, OpenError::BadMagic { found: u32::MAX }.code()),
+        _ => (0, NO_BLOB.code()),
     };
     let [a, b] = slots.map(error_of);
     if b.0 > a.0 { b.1 } else { a.1 }

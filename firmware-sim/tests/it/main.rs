@@ -6,6 +6,7 @@ mod app;
 #[path = "../../../ray-runtime/tests/it/c_build.rs"]
 mod c_build;
 mod c_device;
+mod parts;
 mod power_cuts;
 mod rig;
 mod snapshots;

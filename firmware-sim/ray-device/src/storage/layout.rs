@@ -5,8 +5,9 @@
 //! slot:  log | blob | manifest
 //! ```
 //! Each starts at a multiple of the [line](Geometry::line). Blocks of up to [`LARGEST_OWN`] bytes: the log has its own, as
-//! many as hold [`LEAST_ENTRIES`] entries. Larger ones: it shares the first with the start of the blob. Or it
-//! lies in a region of its own, and the blob starts where its region does.
+//! many as hold [`LEAST_ENTRIES`] entries. Larger ones: it shares the first with the start of the blob, unless
+//! [`LEAST_SHARED`] entries would fill more than half of it. Or it lies in a region of its own, and the blob starts
+//! where its region does.
 
 use crate::port::Geometry;
 
@@ -16,8 +17,15 @@ pub const LARGEST_OWN: u32 = 16 << 10;
 /// Fewest entries of a log.
 pub const LEAST_ENTRIES: u32 = 16;
 
-/// Entries of a log in a block that it shares, unless they would fill more than a quarter of it.
+/// Fewest entries of a log in a block that it shares, as it is not erased before the next update: room for 60
+/// rollbacks in a row and what starts may add.
+pub const LEAST_SHARED: u32 = 72;
+
+/// As many as it has there, unless they would fill more than a quarter of the block.
 const SHARED_ENTRIES: u32 = 256;
+
+/// Lines from which on a record alone fits one, bytes. There an entry begins with a mark.
+const MARKED_LINE: u32 = 64;
 
 /// Length of a record, bytes; it is padded to whole lines.
 pub const RECORD_LENGTH: u32 = 48;
@@ -51,33 +59,43 @@ impl Shape {
 
     /// Whether the log shares its block with the start of the blob.
     pub const fn is_log_shared(self) -> bool {
-        !self.is_log_apart && self.log.block > LARGEST_OWN
+        !self.is_log_apart
+            && self.log.block > LARGEST_OWN
+            && self.entry_length().saturating_mul(LEAST_SHARED) <= self.log.block / 2
     }
 
-    /// Bytes of a record, padded to whole lines: where its seal starts in the entry.
-    pub const fn record_length(self) -> u32 {
-        aligned(RECORD_LENGTH, self.log.line())
-    }
-
-    /// Bytes of an entry of the log: a record and its seal, and what makes that a power of two.
-    pub const fn entry_length(self) -> u32 {
-        let least = self.record_length().saturating_add(self.log.line());
-        match least.checked_next_power_of_two() {
-            Some(length) => length,
-            None => least,
+    /// Where the record starts in an entry: behind the mark, if there is one.
+    pub const fn record_start(self) -> u32 {
+        if self.log.line() < MARKED_LINE {
+            0
+        } else {
+            self.log.line()
         }
+    }
+
+    /// Where the seal starts in an entry: behind the record, padded to whole lines.
+    pub const fn seal_start(self) -> u32 {
+        self.record_start()
+            .saturating_add(aligned(RECORD_LENGTH, self.log.line()))
+    }
+
+    /// Bytes of an entry of the log: mark, record and seal; no less than two of the first layout.
+    pub const fn entry_length(self) -> u32 {
+        let length = self.seal_start().saturating_add(self.log.line());
+        if length < 64 { 64 } else { length }
     }
 
     /// Bytes of the log.
     pub const fn log_length(self) -> u32 {
-        let least = self.entry_length().saturating_mul(LEAST_ENTRIES);
         if !self.is_log_shared() {
+            let least = self.entry_length().saturating_mul(LEAST_ENTRIES);
             return aligned(least, self.log.block);
         }
+        let least = self.entry_length().saturating_mul(LEAST_SHARED);
         let wanted = self.entry_length().saturating_mul(SHARED_ENTRIES);
         let quarter = self.log.block / 4;
         let length = if wanted < quarter { wanted } else { quarter };
-        if length < least { least } else { length }
+        aligned(if length < least { least } else { length }, self.log.line())
     }
 
     /// How many entries the log has.
@@ -119,9 +137,7 @@ impl Shape {
 
     /// Whether the storage can work with it.
     pub const fn is_supported(self) -> bool {
-        self.log.is_supported()
-            && self.blob.is_supported()
-            && (!self.is_log_shared() || self.log_length() < self.blob.block)
+        self.log.is_supported() && self.blob.is_supported()
     }
 }
 
@@ -188,13 +204,15 @@ mod tests {
             (4, 64, 64, 1024),
             (4, 128, 64, 1024),
             (16, 8192, 64, 8192),
-            (32, 131_072, 128, 32_768),
+            (32, 131_072, 96, 24_576),
             (4, 131_072, 64, 16_384),
-            (64, 4096, 128, 4096),
-            (128, 8192, 256, 8192),
-            (256, 4096, 512, 8192),
-            (512, 512, 1024, 16_384),
-            (512, 131_072, 1024, 32_768),
+            (8, 32_768, 64, 8192),
+            (64, 4096, 192, 4096),
+            (128, 8192, 384, 8192),
+            (128, 32_768, 384, 32_768),
+            (256, 4096, 768, 12_288),
+            (512, 512, 1536, 24_576),
+            (512, 262_144, 1536, 110_592),
         ] {
             let shape = shape(unit, block);
             assert!(shape.is_supported());
@@ -202,9 +220,12 @@ mod tests {
             assert_eq!(shape.log_length(), log, "{unit} / {block}");
             assert_eq!(shape.blob_start(), log);
             assert!(shape.entries() >= LEAST_ENTRIES);
-            // The seal has a line of its own.
-            assert!(shape.record_length() + shape.log.line() <= entry);
-            assert!(shape.record_length().is_multiple_of(shape.log.line()));
+            // The seal has a line of its own, and the record is not the first that is programmed, or not alone.
+            let line = shape.log.line();
+            assert!(shape.seal_start() + line <= entry);
+            assert!(shape.seal_start().is_multiple_of(line));
+            assert!(shape.seal_start() >= 2 * line);
+            assert!(shape.seal_start() - shape.record_start() >= RECORD_LENGTH);
             assert!(shape.blob_start().is_multiple_of(shape.blob.line()));
         }
     }

@@ -1,15 +1,18 @@
 //! A slot's log: commit records, one behind the other, each with its seal.
 //!
 //! ```text
-//! entry:  record, padded to whole lines | seal, in a line of its own
+//! entry:  mark, where a line holds a whole record | record | seal
 //! ```
+//! Each starts a line, and what is left of its last line is as erased.
 //! Line by line is programmed and read back. The log stands for its *last valid record*, sealed or not.
 //!
 //! # Why a decision lasts
 //! The line that a cut of power hit may read differently each time, or not at all; all lines before it are
 //! sound. A seal is programmed only after its record was complete, so *a seal proves its record*, even when
 //! the seal itself is the line that wavers: with it or without it, the last valid record is the same. That
-//! is why the seal never shares a line with its record, and is read on its own.
+//! is why the seal never shares a line with its record, and is read on its own. And a record never
+//! wavers in an entry that is blank but for it, so that it cannot read as nothing at all at one start and as valid at the
+//! next: its first lines are sound by then, or the mark in front of it.
 //! A log that ends in anything but a sealed record ([`Log::is_settled`]) may have a record that
 //! wavers. Before a device acts on what it read there, it appends that record once more, with its
 //! seal: this one is sound and is the last from now on, whatever the wavering one reads as. A log
@@ -17,7 +20,7 @@
 
 use super::access::{clear, erase, program, read};
 use super::layout::Shape;
-use super::record::{Found, LENGTH, OLD_LENGTH, Record, SEAL_LENGTH};
+use super::record::{Found, LENGTH, MARK, OLD_LENGTH, Record, SEAL_LENGTH};
 use super::slot::SlotFlash;
 use crate::port::{Clock, Flash};
 use crate::protocol::Refusal;
@@ -31,8 +34,8 @@ const RESERVE: u32 = 8;
 /// Length of an entry of the first layout, bytes: two have room in one of today's.
 const OLD_ENTRY_LENGTH: u32 = 32;
 
-/// Entries that are read between two looks at the watchdog: 4096 bytes of the longest.
-const ENTRIES_A_STEP: u32 = 4;
+/// Entries that are read between two looks at the watchdog: 2048 bytes of the longest, twice.
+const ENTRIES_A_STEP: u32 = 2;
 
 /// What a log says now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,7 +69,7 @@ impl Log {
             }
             log.next = index + 1;
             if let Some(found) = read_record(flash, at, shape) {
-                let seal_at = at.saturating_add(shape.record_length());
+                let seal_at = at.saturating_add(shape.seal_start());
                 log.note(flash, &found, seal_at);
             } else if has_old_entries(shape) {
                 for at in [at, at.saturating_add(OLD_ENTRY_LENGTH)] {
@@ -138,9 +141,15 @@ impl Log {
         let mut outcome = Err(Refusal::LogFull);
         for index in (self.next..shape.entries()).take(APPEND_TRIES as usize) {
             let at = index.saturating_mul(shape.entry_length());
-            let seal_at = at.saturating_add(shape.record_length());
-            outcome = program(flash, at, &bytes, clock)
-                .and_then(|()| program(flash, seal_at, &seal, clock));
+            let record_at = at.saturating_add(shape.record_start());
+            let seal_at = at.saturating_add(shape.seal_start());
+            outcome = if record_at == at {
+                Ok(())
+            } else {
+                program(flash, at, &MARK, clock)
+            }
+            .and_then(|()| program(flash, record_at, &bytes, clock))
+            .and_then(|()| program(flash, seal_at, &seal, clock));
             if outcome.is_ok() {
                 break;
             }
@@ -194,6 +203,7 @@ impl Log {
 /// The record at the start of an entry.
 fn read_record<R: Flash>(flash: &mut R, at: u32, shape: Shape) -> Option<Found> {
     let mut bytes = [0; LENGTH];
+    let at = at.saturating_add(shape.record_start());
     read(flash, at, &mut bytes).ok()?;
     Record::read(&bytes, shape)
 }

@@ -36,7 +36,7 @@ pub struct Claims {
 pub struct Record {
     /// The highest one wins; from 1.
     pub sequence: u32,
-    /// Length of the blob, bytes.
+    /// Length of the blob, bytes; 0: what counts is the [factory](super::factory::Factory)'s blob.
     pub length: u32,
     /// CRC-32 of all its bytes (zlib's).
     pub checksum: u32,
@@ -52,6 +52,9 @@ pub const LENGTH: usize = RECORD_LENGTH as usize;
 pub const SEAL_LENGTH: usize = 8;
 /// Length of a record of the first layout without its seal, bytes.
 pub const OLD_LENGTH: usize = 24;
+
+/// What an entry begins with where a record alone fits a line.
+pub const MARK: [u8; 8] = *b"RaysMark";
 
 const MAGIC: u32 = u32::from_le_bytes(*b"RayD");
 const OLD_MAGIC: u32 = u32::from_le_bytes(*b"RayC");
