@@ -5,7 +5,8 @@
 use core::ffi::{c_int, c_void};
 use core::mem::MaybeUninit;
 use ray_device::port::Regions;
-use ray_device::protocol::Refusal;
+use ray_device::protocol::{Refusal, Rig};
+use ray_device::storage::factory::Factory;
 use ray_device::storage::log::{Log, erase_log};
 use ray_device::storage::record::{Claims, Record};
 use ray_device::storage::slot::SlotFlash;
@@ -39,7 +40,7 @@ pub struct Storage {
 struct Started {
     /// [`STARTED`], or something else.
     state: u32,
-    regions: Regions<Driver, ()>,
+    regions: Regions<Driver, NoFactory>,
     /// The slot in use, if there is one.
     active: Option<u8>,
     /// Why there is none.
@@ -48,6 +49,15 @@ struct Started {
     claims: Claims,
     next_sequence: Option<u32>,
     update: Option<Update>,
+}
+
+/// What it was made with is the application's business.
+struct NoFactory;
+
+impl Factory for NoFactory {
+    fn rig(&mut self) -> Option<Rig> {
+        None
+    }
 }
 
 /// A blob under way.
@@ -83,7 +93,7 @@ pub unsafe extern "C" fn rays_storage_start(
     let started = started.write(Started {
         state: 0,
         regions: Regions {
-            factory: (),
+            factory: NoFactory,
             slots: *drivers,
         },
         active: None,

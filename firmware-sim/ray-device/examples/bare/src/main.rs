@@ -13,7 +13,8 @@ use panic_halt as _;
 use ray_runtime::{Aligned, PixelPoint, RayBlob};
 
 /// Compiled in. A blob must start on a multiple of 8.
-static COMPILED_IN: &Aligned<[u8]> = &Aligned(*include_bytes!("../../../../../ray-runtime/example.rays"));
+static COMPILED_IN: &Aligned<[u8]> =
+    &Aligned(*include_bytes!("../../../../../ray-runtime/example.rays"));
 
 /// Put into the region RAYS of `memory.x` by the linker. It is not read by this name: the compiler would take the bytes that it knows,
 /// and miss those that a flash tool wrote there later.
@@ -26,7 +27,10 @@ const EXAMPLE: &[u8; include_bytes!("../../../../../ray-runtime/example.rays").l
     include_bytes!("../../../../../ray-runtime/example.rays");
 
 /// The region RAYS: a blob, and whatever is behind it.
-#[allow(unsafe_code, reason = "the linker's symbols, and the memory between them")]
+#[allow(
+    unsafe_code,
+    reason = "the linker's symbols, and the memory between them"
+)]
 fn region() -> &'static [u8] {
     unsafe extern "C" {
         static _rays_start: u8;

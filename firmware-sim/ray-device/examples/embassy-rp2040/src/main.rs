@@ -57,7 +57,15 @@ async fn main(_spawner: Spawner) -> ! {
 
     static BUFFERS: StaticCell<[[u8; 256]; 2]> = StaticCell::new();
     let [tx, rx] = BUFFERS.init([[0; 256]; 2]);
-    let mut uart = BufferedUart::new(board.UART0, board.PIN_0, board.PIN_1, Irqs, tx, rx, Config::default());
+    let mut uart = BufferedUart::new(
+        board.UART0,
+        board.PIN_0,
+        board.PIN_1,
+        Irqs,
+        tx,
+        rx,
+        Config::default(),
+    );
 
     let mut device = Device::new("example rp2040", Uptime);
     let mut session = Session::new();

@@ -57,8 +57,16 @@ async fn main(_spawner: Spawner) -> ! {
 
     static BUFFERS: StaticCell<[[u8; 256]; 2]> = StaticCell::new();
     let [tx, rx] = BUFFERS.init([[0; 256]; 2]);
-    let mut uart = BufferedUart::new(board.USART3, board.PD9, board.PD8, tx, rx, Irqs, Config::default())
-        .expect("115200 baud divide the clock");
+    let mut uart = BufferedUart::new(
+        board.USART3,
+        board.PD9,
+        board.PD8,
+        tx,
+        rx,
+        Irqs,
+        Config::default(),
+    )
+    .expect("115200 baud divide the clock");
 
     let mut device = Device::new("example stm32h743", Uptime);
     let mut session = Session::new();

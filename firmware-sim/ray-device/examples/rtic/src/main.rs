@@ -19,8 +19,8 @@ mod app {
     use panic_halt as _;
     use ray_device::app::{Device, Epoch};
     use ray_device::port::{Link, Regions};
-    use ray_device::session::Session;
     use ray_device::session::Responder;
+    use ray_device::session::Session;
     use ray_runtime::{PixelPoint, RayBlob, Triangulation};
 
     use crate::board::Interrupt;
@@ -71,7 +71,12 @@ mod app {
     /// Answers the workstation byte by byte; an update programs and erases here.
     #[task(binds = UART0, priority = 1, local = [epoch, session, uart])]
     fn serve(context: serve::Context) {
-        let serve::LocalResources { epoch, session, uart, .. } = context.local;
+        let serve::LocalResources {
+            epoch,
+            session,
+            uart,
+            ..
+        } = context.local;
         while let Some(byte) = machine::uart_receive() {
             if let Some(frame) = session.feed(byte, epoch) {
                 let Ok(()) = uart.write_all(frame);
