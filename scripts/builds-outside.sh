@@ -31,7 +31,7 @@ edition = "2024"
 ray-runtime = { $2, default-features = false }
 ray-device = { $3, default-features = false }
 [features]
-all = ["ray-runtime/old-versions", "ray-runtime/defmt", "ray-device/old-versions", "ray-device/signed",
+all = ["ray-runtime/patches", "ray-runtime/quantized", "ray-runtime/old-versions", "ray-runtime/defmt", "ray-device/old-versions", "ray-device/signed",
   "ray-device/defmt", "ray-device/embedded-io", "ray-device/embedded-io-async"]
 nalgebra = ["ray-runtime/nalgebra"]
 [workspace]

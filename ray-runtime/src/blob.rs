@@ -202,7 +202,13 @@ impl<'a> RayBlob<'a> {
     /// # Errors
     /// [`LookupError::Outside`], [`LookupError::NoSuchCamera`].
     pub fn lookup(&self, camera: usize, pixel: PixelPoint) -> Result<Ray, LookupError> {
-        self.views().lookup(self.record(camera)?, pixel)
+        self.ray((camera, pixel))
+    }
+
+    /// [`RayBlob::lookup`] where it is called: rays that stay in registers are not copied.
+    #[inline(always)]
+    fn ray(&self, (camera, pixel): (usize, PixelPoint)) -> Result<Ray, LookupError> {
+        self.views.lookup(self.record(camera)?, pixel)
     }
 
     /// Whether the pixel of a camera has a ray.
@@ -220,14 +226,13 @@ impl<'a> RayBlob<'a> {
         a: (usize, PixelPoint),
         b: (usize, PixelPoint),
     ) -> Result<Triangulation, MeasureError> {
-        // By reference: a ray that is passed on as a result of its own is copied word by word.
-        let ray_a = self.lookup(a.0, a.1);
-        let ray_b = self.lookup(b.0, b.1);
-        match (&ray_a, &ray_b) {
-            (Ok(ray_a), Ok(ray_b)) => triangulate::triangulate_pair(ray_a, ray_b),
-            (Err(error), _) => Err(MeasureError::of_lookup(*error, a.0)),
-            (_, Err(error)) => Err(MeasureError::of_lookup(*error, b.0)),
-        }
+        let ray_a = self
+            .ray(a)
+            .map_err(|error| MeasureError::of_lookup(error, a.0))?;
+        let ray_b = self
+            .ray(b)
+            .map_err(|error| MeasureError::of_lookup(error, b.0))?;
+        Ok(triangulate::meet(&ray_a, &ray_b)?.found)
     }
 
     /// [`RayBlob::triangulate`] with the covariance of the point, rig frame. The cameras may come in

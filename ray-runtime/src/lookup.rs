@@ -1,6 +1,7 @@
 //! A pixel's ray from a camera's table.
 
-use crate::format::{Encoding, Form, OLDEST_VERSION, Record};
+use crate::format::{Encoding, Form, Record};
+use crate::grid::Inside;
 use crate::polynomial::{self, Dual, Number};
 use crate::quantized;
 use crate::spline;
@@ -68,10 +69,15 @@ impl Evaluated for Dual {
     }
 }
 
-const CENTRAL_PATCHES: u32 = number(Form::Patches, true);
-const NON_CENTRAL_PATCHES: u32 = number(Form::Patches, false);
+pub(crate) const CENTRAL_PATCHES: u32 = number(Form::Patches, true);
+pub(crate) const NON_CENTRAL_PATCHES: u32 = number(Form::Patches, false);
 const CENTRAL_SPLINE: u32 = number(Form::Spline, true);
 const NON_CENTRAL_SPLINE: u32 = number(Form::Spline, false);
+
+/// Forms that are read: nothing is linked of those that are not.
+pub(crate) const HAS_PATCHES: bool = cfg!(feature = "patches");
+pub(crate) const HAS_QUANTIZED: bool = cfg!(feature = "quantized");
+const HAS_SPLINES: bool = cfg!(feature = "old-versions");
 
 const fn number(form: Form, is_central: bool) -> u32 {
     Encoding { form, is_central }.number()
@@ -80,21 +86,30 @@ const fn number(form: Form, is_central: bool) -> u32 {
 impl Views<'_> {
     /// The ray of a pixel, rig frame.
     #[inline(always)]
-    pub fn lookup(self, record: Record<'_>, pixel: PixelPoint) -> Result<Ray, LookupError> {
-        if !is_calibrated(self.bytes, record, pixel) {
-            return Err(LookupError::Outside);
+    pub fn lookup(&self, record: Record<'_>, pixel: PixelPoint) -> Result<Ray, LookupError> {
+        let places = calibrated(self.bytes, record, pixel).ok_or(LookupError::Outside)?;
+        // The form that is for speed, in the place of the call; all others behind another one.
+        if HAS_PATCHES && record.encoding() == CENTRAL_PATCHES {
+            let [s] = self.patch::<1, f32>(record, places)?;
+            Ok(central_ray(Pose::of(record), s))
+        } else {
+            self.lookup_other(record, pixel)
         }
-        match record.encoding() {
-            CENTRAL_PATCHES => {
-                let [s] = self.patch::<1, f32>(record, pixel)?;
-                Ok(central_ray(record, s))
-            }
-            NON_CENTRAL_PATCHES => {
-                let [s, n] = self.patch::<2, f32>(record, pixel)?;
-                Ok(shifted_ray(record, Sample { s, n }))
-            }
-            _ if is_spline(record) => lookup_spline(self.pairs, record, pixel),
-            _ => quantized::lookup(self.pairs, record, from_edge(record, pixel)),
+    }
+
+    /// The ray of a calibrated pixel from a table of another form.
+    #[inline(never)]
+    fn lookup_other(&self, record: Record<'_>, pixel: PixelPoint) -> Result<Ray, LookupError> {
+        if HAS_PATCHES && record.encoding() == NON_CENTRAL_PATCHES {
+            let [s, n] = self.patch::<2, f32>(record, inside(record, pixel)?)?;
+            Ok(shifted_ray(Pose::of(record), Sample { s, n }))
+        } else if is_spline(record) {
+            lookup_spline(self.pairs, record, pixel)
+        } else if HAS_QUANTIZED {
+            quantized::lookup(self.pairs, record, from_edge(record, pixel))
+        } else {
+            // Never: `open` refuses what is left out.
+            Err(LookupError::Outside)
         }
     }
 
@@ -104,29 +119,30 @@ impl Views<'_> {
     /// It is for size, where `lookup` is for speed.
     #[inline(never)]
     pub fn lookup_moving(
-        self,
+        &self,
         record: Record<'_>,
         pixel: PixelPoint,
     ) -> Result<MovingRay, LookupError> {
-        if !(record.axis_u().contains(pixel.u) && record.axis_v().contains(pixel.v)) {
-            return Err(LookupError::Outside);
-        }
+        let places = inside(record, pixel)?;
         let sample: Sample<Dual> = match record.encoding() {
-            CENTRAL_PATCHES => {
-                let [s] = self.patch(record, pixel)?;
+            CENTRAL_PATCHES if HAS_PATCHES => {
+                let [s] = self.patch(record, places)?;
                 Sample {
                     s,
                     n: [0.0.into(); 2],
                 }
             }
-            NON_CENTRAL_PATCHES => {
-                let [s, n] = self.patch(record, pixel)?;
+            NON_CENTRAL_PATCHES if HAS_PATCHES => {
+                let [s, n] = self.patch(record, places)?;
                 Sample { s, n }
             }
             _ if is_spline(record) => {
                 spline::sample(self.pairs, record, pixel).ok_or(LookupError::Outside)?
             }
-            _ => quantized::sample_moving(self.pairs, record, pixel).ok_or(LookupError::Outside)?,
+            _ if HAS_QUANTIZED => {
+                quantized::sample_moving(self.pairs, record, pixel).ok_or(LookupError::Outside)?
+            }
+            _ => return Err(LookupError::Outside),
         };
         let part = |part: fn(Dual) -> f32| Sample {
             s: sample.s.map(part),
@@ -143,17 +159,18 @@ impl Views<'_> {
     /// The cubics of a pixel's cell: of the half-angle vector, and of the offset if `MAPS` is 2.
     #[inline(always)]
     fn patch<const MAPS: usize, T: Evaluated>(
-        self,
+        &self,
         record: Record<'_>,
-        pixel: PixelPoint,
+        [u, v]: [Inside; 2],
     ) -> Result<[[T; 2]; MAPS], LookupError> {
-        let [cells_u, cells_v] = record.cells();
         let (axis_u, axis_v) = (record.axis_u(), record.axis_v());
-        let (cell_u, x) = axis_u.cell_and_share(pixel.u, cells_u);
-        let (cell_v, y) = axis_v.cell_and_share(pixel.v, cells_v);
+        let (cell_u, cell_v) = (axis_u.cell(u), axis_v.cell(v));
+        let x = axis_u.share(u.from_edge_px, axis_u.cell_edge_px(cell_u));
+        let y = axis_v.share(v.from_edge_px, axis_v.cell_edge_px(cell_v));
         let x = T::along_u(x, axis_u.cells_per_px);
         let y = T::along_v(y, axis_v.cells_per_px);
-        let cell = cell_v * cells_u as usize + cell_u;
+        let [cells_u, _] = record.cells();
+        let cell = (cell_v * cells_u + cell_u) as usize;
         let start = (record.grid_offset() >> 3) as usize + cell * (10 * MAPS);
         let coefficients = self.pairs.get(start..).ok_or(LookupError::Outside)?;
         let (maps, _) = coefficients.as_chunks::<10>();
@@ -170,8 +187,8 @@ impl Views<'_> {
 /// Whether a table is of the form of old versions; never, so that nothing of it is linked, where they
 /// are not read.
 #[inline(always)]
-fn is_spline(record: Record<'_>) -> bool {
-    OLDEST_VERSION < 3 && matches!(record.encoding(), CENTRAL_SPLINE | NON_CENTRAL_SPLINE)
+pub(crate) fn is_spline(record: Record<'_>) -> bool {
+    HAS_SPLINES && matches!(record.encoding(), CENTRAL_SPLINE | NON_CENTRAL_SPLINE)
 }
 
 /// The ray from such a table.
@@ -203,26 +220,44 @@ impl MovingRay {
 /// The ray of a sample of a camera's table, rig frame.
 #[inline(always)]
 pub(crate) fn ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
+    let pose = Pose::of(record);
     if record.is_central() {
-        central_ray(record, sample.s)
+        central_ray(pose, sample.s)
     } else {
-        shifted_ray(record, sample)
+        shifted_ray(pose, sample)
+    }
+}
+
+/// Where a camera is: rows of the rotation, one after the other, and the translation, mm.
+#[derive(Clone, Copy)]
+pub(crate) struct Pose {
+    rotation: [f32; 9],
+    translation_mm: [f32; 3],
+}
+
+impl Pose {
+    #[inline(always)]
+    pub fn of(record: Record<'_>) -> Self {
+        Self {
+            rotation: record.rotation(),
+            translation_mm: record.translation_mm(),
+        }
     }
 }
 
 #[inline(always)]
-fn central_ray(record: Record<'_>, s: [f32; 2]) -> Ray {
+pub(crate) fn central_ray(pose: Pose, s: [f32; 2]) -> Ray {
     Ray {
-        origin_mm: record.translation_mm(),
-        direction: direction(record.rotation(), s),
+        origin_mm: pose.translation_mm,
+        direction: direction(pose.rotation, s),
     }
 }
 
 #[inline(always)]
-fn shifted_ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
+pub(crate) fn shifted_ray(pose: Pose, sample: Sample<f32>) -> Ray {
     Ray {
-        origin_mm: origin(record.rotation(), record.translation_mm(), sample),
-        direction: direction(record.rotation(), sample.s),
+        origin_mm: origin(pose.rotation, pose.translation_mm, sample),
+        direction: direction(pose.rotation, sample.s),
     }
 }
 
@@ -235,17 +270,34 @@ pub(crate) fn from_edge(record: Record<'_>, pixel: PixelPoint) -> PixelPoint {
     }
 }
 
+/// Where a pixel lies in the region.
+#[inline(always)]
+fn inside(record: Record<'_>, pixel: PixelPoint) -> Result<[Inside; 2], LookupError> {
+    let u = record
+        .axis_u()
+        .inside(pixel.u)
+        .ok_or(LookupError::Outside)?;
+    let v = record
+        .axis_v()
+        .inside(pixel.v)
+        .ok_or(LookupError::Outside)?;
+    Ok([u, v])
+}
+
+/// The same if it is in a cell of the mask that is set.
+#[inline(always)]
+fn calibrated(bytes: &[u8], record: Record<'_>, pixel: PixelPoint) -> Option<[Inside; 2]> {
+    let [u, v] = inside(record, pixel).ok()?;
+    let (cell_u, cell_v) = (record.axis_u().mask_cell(u), record.axis_v().mask_cell(v));
+    let [cells_u, _] = record.mask_cells();
+    let bit = (cell_v * cells_u + cell_u) as usize;
+    let byte = bytes.get(record.mask_offset() as usize + (bit >> 3))?;
+    (byte >> (bit & 7) & 1 == 1).then_some([u, v])
+}
+
 /// Whether the pixel is in the region and in a cell of the mask that is set.
 pub(crate) fn is_calibrated(bytes: &[u8], record: Record<'_>, pixel: PixelPoint) -> bool {
-    let (axis_u, axis_v) = (record.axis_u(), record.axis_v());
-    if !(axis_u.contains(pixel.u) && axis_v.contains(pixel.v)) {
-        return false;
-    }
-    let [cells_u, cells_v] = record.mask_cells();
-    let bit =
-        axis_v.mask_cell(pixel.v, cells_v) * cells_u as usize + axis_u.mask_cell(pixel.u, cells_u);
-    let byte = bytes.get(record.mask_offset() as usize + (bit >> 3));
-    byte.is_some_and(|byte| byte >> (bit & 7) & 1 == 1)
+    calibrated(bytes, record, pixel).is_some()
 }
 
 /// The unnormalized direction of a half-angle vector, `R (s1, s2, 1 - s.s/4)`; its length is

@@ -1,6 +1,7 @@
 //! What goes in and what comes out: a pixel, and the line in space that it sees.
 
 /// A point on the sensor, px: the center of the top-left pixel is (0, 0), u right, v down.
+#[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PixelPoint {
@@ -18,6 +19,7 @@ impl PixelPoint {
 }
 
 /// The points `origin_mm + lambda * direction`, lambda > 0 in front of the camera; rig frame.
+#[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ray {
@@ -26,4 +28,18 @@ pub struct Ray {
     pub origin_mm: [f32; 3],
     /// From the camera into the scene, not normalized: its length is between 1 and 5.
     pub direction: [f32; 3],
+}
+
+impl Ray {
+    /// What stands in a row of rays for a pixel that is not calibrated: no numbers.
+    pub const OUTSIDE: Self = Self {
+        origin_mm: [f32::NAN; 3],
+        direction: [f32::NAN; 3],
+    };
+
+    /// Whether it is [`OUTSIDE`](Self::OUTSIDE): no ray.
+    pub fn is_outside(&self) -> bool {
+        let [x, _, _] = self.direction;
+        x.is_nan()
+    }
 }

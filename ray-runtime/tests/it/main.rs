@@ -9,6 +9,7 @@ mod document;
 mod golden;
 mod project;
 mod questions;
+mod rows;
 mod sections;
 mod test_blob;
 mod uncertainty;
