@@ -316,16 +316,17 @@ impl<'a> RayBlob<'a> {
     /// The point nearest to the rays of any number of cameras, by least squares. Two give the
     /// bits of [`RayBlob::triangulate`].
     ///
-    /// Nothing is stored, so each ray is looked up about five times if there are more than two.
+    /// Nothing is stored, so each ray is looked up about five times if there are more than two. A sighting is a
+    /// camera and a pixel, or whatever becomes such a pair.
     ///
     /// # Errors
     /// Any [`MeasureError`].
-    pub fn triangulate_many(
+    pub fn triangulate_many<S: Copy + Into<(usize, PixelPoint)>>(
         &self,
-        sightings: &[(usize, PixelPoint)],
+        sightings: &[S],
     ) -> Result<Triangulation, MeasureError> {
         triangulate::triangulate_many(sightings.len(), |k| match sightings.get(k) {
-            Some(&sighting) => self.sighting(sighting),
+            Some(&sighting) => self.sighting(sighting.into()),
             None => Err(MeasureError::TooFewRays { have: k }),
         })
     }
