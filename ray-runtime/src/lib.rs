@@ -17,6 +17,8 @@ mod check;
 mod error;
 pub mod format;
 mod grid;
+#[cfg(feature = "integer")]
+pub mod integer;
 mod knots;
 mod lookup;
 mod match_noise;
