@@ -11,9 +11,9 @@ pub struct Axis {
     /// Outer edge of the region's first pixel, and extent of the region: 65536ths of a pixel.
     min: i32,
     extent: u32,
-    /// By how much the extent is shifted to be above 2^30, at most 2^31.
-    shift: u8,
-    /// One by the extent so shifted, in 2^-61.
+    /// The power of two that takes the extent above 2^30, at most to 2^31.
+    scale: u32,
+    /// One by the extent so scaled, in 2^-61.
     inverse: u32,
     mask_cells: u32,
     cells: u32,
@@ -36,7 +36,7 @@ impl Axis {
             .cast_unsigned();
         let pixels = NonZero::new(extent >> 16)?;
         let shift = (pixels.get() - 1).leading_zeros().saturating_sub(17);
-        let pixels = pixels.get() << shift;
+        let pixels = pixels.get() << (shift & 31);
         // 2^46 / pixels, rounded up, in two steps of a long division.
         let divisor = NonZero::new(pixels)?;
         let (first, rest) = ((1_u32 << 31) / divisor, (1_u32 << 31) % divisor);
@@ -53,7 +53,7 @@ impl Axis {
         (axis.cell_high_px.to_bits() >= least_cell).then_some(Self {
             min,
             extent,
-            shift: shift as u8,
+            scale: 1 << (shift & 31),
             inverse,
             mask_cells,
             cells,
@@ -68,7 +68,7 @@ impl Axis {
         if from_edge > self.extent {
             return None;
         }
-        let half = product_unsigned(from_edge << self.shift, self.inverse);
+        let half = product_unsigned(from_edge.wrapping_mul(self.scale), self.inverse);
         // Never before the exact place, so that a border belongs to the cell behind it.
         Some(Place((2 * half + 6).min(i32::MAX.cast_unsigned())))
     }
@@ -76,6 +76,11 @@ impl Axis {
     /// Cells of the table.
     pub fn cells(&self) -> u32 {
         self.cells
+    }
+
+    /// Cells of the mask.
+    pub fn mask_cells(&self) -> u32 {
+        self.mask_cells
     }
 
     /// The mask's cell at a place.

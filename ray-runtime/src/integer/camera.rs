@@ -3,7 +3,7 @@
 use super::axis::{Axis, Place};
 use super::float::{Digits, normalized};
 use super::knots;
-use super::polynomial::{self, CUBIC};
+use super::polynomial::{self, CUBIC, Shares};
 use super::product::product;
 use super::ray::{FixedPixel, Pose, Sample, ray};
 use super::spline;
@@ -19,20 +19,20 @@ const S_DIGITS: Digits = Digits::new(28);
 const R_DIGITS: Digits = Digits::new(30);
 
 /// A camera.
+// In this order, so that instructions of 16 binary digits reach all but the last.
+#[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Camera<'a> {
+    axes: [Axis; 2],
     views: Views<'a>,
     mask_offset: u32,
-    mask_cells_u: u32,
-    cells_u: u32,
-    axes: [Axis; 2],
-    pose: Pose,
-    /// Binary digits of lengths behind the point.
-    n_digits: i32,
-    table: Table,
-    is_central: bool,
     /// Where the table starts, in pairs of the blob.
     start: usize,
+    is_central: bool,
+    /// Binary digits of lengths behind the point.
+    n_digits: i32,
+    pose: Pose,
+    table: Table,
 }
 
 /// What a table is made of.
@@ -106,8 +106,6 @@ impl<'a> Camera<'a> {
         Some(Self {
             views,
             mask_offset: record.mask_offset(),
-            mask_cells_u: mask_u,
-            cells_u,
             axes: [
                 Axis::prepare(record.axis_u(), cells_u, mask_u)?,
                 Axis::prepare(record.axis_v(), cells_v, mask_v)?,
@@ -129,7 +127,7 @@ impl<'a> Camera<'a> {
     pub fn ray(&self, pixel: FixedPixel) -> Option<([i32; 3], [i32; 3])> {
         let [axis_u, axis_v] = &self.axes;
         let (u, v) = (axis_u.place(pixel.u)?, axis_v.place(pixel.v)?);
-        let bit = axis_v.mask_cell(v) * self.mask_cells_u + axis_u.mask_cell(u);
+        let bit = axis_v.mask_cell(v) * axis_u.mask_cells() + axis_u.mask_cell(u);
         let byte = self.views.bytes.get((self.mask_offset + (bit >> 3)) as usize)?;
         if byte >> (bit & 7) & 1 == 0 {
             return None;
@@ -147,16 +145,17 @@ impl<'a> Camera<'a> {
     fn patch(&self, u: Place, v: Place) -> Option<Sample> {
         let [axis_u, axis_v] = &self.axes;
         let ((cell_u, x), (cell_v, y)) = (axis_u.cell_and_share(u), axis_v.cell_and_share(v));
-        let cell = (cell_v * self.cells_u + cell_u) as usize;
+        let shares = Shares::new(x, y);
+        let cell = (cell_v * self.axes[0].cells() + cell_u) as usize;
         let maps = if self.is_central { 1 } else { 2 };
         let pairs = self.views.pairs.get(self.start + cell * maps * CUBIC..)?;
         let (direction, rest) = pairs.split_first_chunk()?;
         Some(Sample {
-            s: polynomial::patch(direction, S_DIGITS, x, y),
+            s: polynomial::patch(direction, S_DIGITS, &shares)?,
             n: if self.is_central {
                 [0; 2]
             } else {
-                polynomial::patch(rest.first_chunk()?, Digits::new(self.n_digits), x, y)
+                polynomial::patch(rest.first_chunk()?, Digits::new(self.n_digits), &shares)?
             },
         })
     }
@@ -166,7 +165,7 @@ impl<'a> Camera<'a> {
         let pairs = self.views.pairs.get(self.start..)?;
         let left = self.window(u, v).blend_words(pairs, table.knots_start)?;
         let (x, y) = (u.centered(), v.centered());
-        let [a, b] = polynomial::prepared_cubic(&table.direction, x, y);
+        let [a, b] = polynomial::prepared_cubic(&table.direction, x, y)?;
         Some(Sample {
             s: [
                 a.wrapping_add(table.unit.times(left[0])),
@@ -175,14 +174,14 @@ impl<'a> Camera<'a> {
             n: if self.is_central {
                 [0; 2]
             } else {
-                polynomial::prepared_cubic(&table.offset, x, y)
+                polynomial::prepared_cubic(&table.offset, x, y)?
             },
         })
     }
 
     fn window(&self, u: Place, v: Place) -> knots::Window {
         let [axis_u, axis_v] = &self.axes;
-        knots::Window::at(self.cells_u, axis_u.knot_place(u), axis_v.knot_place(v))
+        knots::Window::at(self.axes[0].cells(), axis_u.knot_place(u), axis_v.knot_place(v))
     }
 
     /// A quantized table of any kind.
@@ -208,7 +207,7 @@ impl<'a> Camera<'a> {
         let behind = start + coefficient_count(direction.degree.into());
         let cells_v = self.axes[1].cells();
         let offset_knots =
-            knots + knots_len([self.cells_u, cells_v], direction.number_len).div_ceil(ALIGNMENT);
+            knots + knots_len([self.axes[0].cells(), cells_v], direction.number_len).div_ceil(ALIGNMENT);
         Some(Sample {
             s: value(direction, start, knots, 28)?,
             n: if self.is_central {
@@ -227,7 +226,7 @@ impl<'a> Camera<'a> {
         }
         let [axis_u, axis_v] = &self.axes;
         let places = (axis_u.cell_and_fraction(u), axis_v.cell_and_fraction(v));
-        let window = spline::Window::at(self.cells_u, places.0, places.1);
+        let window = spline::Window::at(self.axes[0].cells(), places.0, places.1);
         let knots = self.views.pairs.get(self.start..)?;
         let step = if self.is_central { 1 } else { 2 };
         Some(Sample {

@@ -1,6 +1,8 @@
 //! Numbers of f32 taken apart and put together by operations of integers: no call of a floating-point
 //! library, and the same bits on every core.
 
+use super::product::leading_zeros;
+
 /// Exponent of the highest digit of an f32's significand when that is shifted to the top of a word: a number is
 /// `word * 2^(exponent - WORD)`.
 const WORD: u32 = 127 + 31;
@@ -28,6 +30,25 @@ impl Digits {
         };
         let sign = bits.cast_signed() >> 31;
         (magnitude.cast_signed() ^ sign).wrapping_sub(sign)
+    }
+
+    /// The product of the number's first 15 binary digits with one of 16 in 2^-15, rounded down; the digits must be
+    /// [`for_short_products`](Self::for_short_products). Some other of a number whose magnitude is not below 4 of the highest
+    /// digits.
+    #[inline(always)]
+    pub fn short_product(self, number: f32, power: u32) -> i32 {
+        let bits = number.to_bits();
+        let shift = self.0.wrapping_sub((bits << 1) >> 24).min(31);
+        let magnitude = (bits << 8 | 1 << 31) >> 17;
+        let sign = bits.cast_signed() >> 31;
+        // The sign before the shift: it costs registers behind it, as the compiler puts it off.
+        let digits = (magnitude.cast_signed() ^ sign).wrapping_sub(sign);
+        digits.wrapping_mul(power.cast_signed()) >> shift
+    }
+
+    /// What [`short_product`](Self::short_product) takes.
+    pub fn for_short_products(self) -> Self {
+        Self(self.0.wrapping_sub(2))
     }
 
     /// No less than the number's magnitude; the largest word if that has no place in one.
@@ -65,7 +86,7 @@ pub fn unsigned_to_f32(number: u32, exponent: i32) -> f32 {
 
 #[inline(never)]
 fn unsigned_to_bits(number: u32, exponent: i32) -> u32 {
-    let zeros = number.leading_zeros();
+    let zeros = leading_zeros(number);
     let shifted = number.wrapping_shl(zeros);
     // Of the f32 whose significand this is, one less: the highest digit adds the one.
     let stated = exponent.wrapping_add(157).wrapping_sub_unsigned(zeros);

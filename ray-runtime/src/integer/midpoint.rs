@@ -5,7 +5,7 @@
 //! needs no more digits than 16, as long as it is the same everywhere: it is n, shifted up and cut.
 
 use super::float::{to_f32, unsigned_to_f32};
-use super::product::{product, product_by_half, reciprocal};
+use super::product::{leading_zeros, product, product_by_half, reciprocal};
 use crate::{MIN_PARALLAX_SIN, MeasureError, Triangulation};
 
 /// A [`Triangulation`] in fixed point.
@@ -68,9 +68,11 @@ pub fn meet(
         half.wrapping_mul(half).wrapping_add(low).cast_unsigned()
     });
     let square = square[0].wrapping_add(square[1]).wrapping_add(square[2]);
-    // From 2^28 on, as the largest part of m is from 2^14 on.
-    let zeros = square.leading_zeros();
-    let inverse = reciprocal(square << (zeros & 31));
+    // From 2^28 on, as the largest part of m is from 2^14 on: three zeros at most, and no loop for them.
+    let twice = if square >> 30 == 0 { 2 } else { 0 };
+    let once = u32::from((square << twice) >> 31 == 0);
+    let zeros = twice + once;
+    let inverse = reciprocal(square << zeros);
 
     let w: [i32; 3] = core::array::from_fn(|k| o2[k].wrapping_sub(o1[k]));
     let along = |d: &[i32; 3]| dot(&w, &cross(d, &m, product_by_half));
@@ -80,11 +82,11 @@ pub fn meet(
     }
     // No finer than the unit of the origins.
     let down = up.wrapping_add(zeros).wrapping_add(1);
-    let finer = (l1 | l2).leading_zeros().wrapping_sub(2).min(down);
+    let finer = leading_zeros((l1 | l2).cast_unsigned()).wrapping_sub(2).min(down);
     let down = down.wrapping_sub(finer);
     let end = |o: &[i32; 3], d: &[i32; 3], l: i32| -> [i32; 3] {
         let lambda = product::<1>(l << (finer & 31), inverse);
-        core::array::from_fn(|k| (o[k] >> down.min(31)).wrapping_add(product::<1>(lambda, d[k])))
+        core::array::from_fn(|k| (o[k] >> (down & 31)).wrapping_add(product::<1>(lambda, d[k])))
     };
     let (end1, end2) = (end(o1, d1, l1), end(o2, d2, l2));
     let exponent = exponent.wrapping_add_unsigned(down);
@@ -130,11 +132,11 @@ fn is_parallel(d1: &[i32; 3], d2: &[i32; 3], n: [i32; 3], up: u32) -> bool {
     }
 }
 
-/// By how many binary digits the largest of three numbers can be shifted up; 31 or 32 if there is none.
+/// By how many binary digits the largest of three numbers can be shifted up; 30 if all are 0 or -1.
 #[inline(always)]
 fn room(numbers: [i32; 3]) -> u32 {
     let [a, b, c] = numbers.map(|x| x ^ x >> 31);
-    (a | b | c).leading_zeros().wrapping_sub(1)
+    leading_zeros((a | b | c).cast_unsigned()).wrapping_sub(1)
 }
 
 #[inline(always)]
@@ -153,9 +155,17 @@ fn dot(a: &[i32; 3], b: &[i32; 3]) -> i32 {
 /// The square of a length, and the exponent of what it is counted in, halved.
 #[inline(always)]
 fn squared(numbers: [i32; 3]) -> (u32, i32) {
-    let room = room(numbers).min(31);
-    let down = 16_u32.saturating_sub(room);
-    let square = |x: i32| (x >> (down & 31)).wrapping_mul(x >> (down & 31)).cast_unsigned();
-    let [a, b, c] = numbers.map(square);
+    // A usual gap needs no more than 16 binary digits.
+    let [a, b, c] = numbers.map(|x| x ^ x >> 31);
+    let all = a | b | c;
+    let down = if all >> 15 == 0 {
+        0
+    } else {
+        17_u32.saturating_sub(leading_zeros(all.cast_unsigned()))
+    };
+    let [a, b, c] = numbers.map(|x| {
+        let x = x >> (down & 31);
+        x.wrapping_mul(x).cast_unsigned()
+    });
     (a.wrapping_add(b).wrapping_add(c), down.cast_signed())
 }

@@ -65,7 +65,6 @@ pub fn ray(pose: &Pose, sample: Sample, is_central: bool) -> Option<([i32; 3], [
     let mut direction = [0; 3];
     let (rows, _) = pose.rotation.as_chunks::<3>();
     for (component, [r1, r2, r3]) in direction.iter_mut().zip(rows) {
-        // In 2^-28, where the third column is in 2^-30.
         let across = product::<2>(*r1, s1).wrapping_add(product::<2>(*r2, s2));
         *component = (r3 >> 2).wrapping_add(across.wrapping_sub(product::<2>(*r3, drop)));
     }

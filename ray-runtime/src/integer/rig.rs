@@ -111,7 +111,8 @@ impl<'a, const N: usize> Rig<'a, N> {
     /// Those of [`lookup`](Self::lookup).
     #[inline(never)]
     pub fn lookup_fixed(&self, camera: usize, pixel: FixedPixel) -> Result<FixedRay, LookupError> {
-        let (origin, direction) = self.ray(camera, pixel)?;
+        let ray = self.ray(camera, pixel);
+        let (origin, direction) = ray.ok_or_else(|| self.error(camera))?;
         Ok(FixedRay {
             origin,
             direction,
@@ -147,22 +148,29 @@ impl<'a, const N: usize> Rig<'a, N> {
         a: (usize, FixedPixel),
         b: (usize, FixedPixel),
     ) -> Result<FixedPoint, MeasureError> {
-        let ray = |(camera, pixel): (usize, FixedPixel)| {
-            self.ray(camera, pixel)
-                .map_err(|error| MeasureError::of_lookup(error, camera))
-        };
-        midpoint::meet(&ray(a)?, &ray(b)?, self.exponent)
+        // By reference, so that nothing is copied.
+        match (&self.ray(a.0, a.1), &self.ray(b.0, b.1)) {
+            (Some(ray_a), Some(ray_b)) => midpoint::meet(ray_a, ray_b, self.exponent),
+            (None, _) => Err(MeasureError::of_lookup(self.error(a.0), a.0)),
+            (_, None) => Err(MeasureError::of_lookup(self.error(b.0), b.0)),
+        }
     }
 
     #[inline(never)]
-    fn ray(&self, camera: usize, pixel: FixedPixel) -> Result<([i32; 3], [i32; 3]), LookupError> {
-        let Some(Some(prepared)) = self.cameras.get(camera) else {
-            return Err(LookupError::NoSuchCamera {
+    fn ray(&self, camera: usize, pixel: FixedPixel) -> Option<([i32; 3], [i32; 3])> {
+        self.cameras.get(camera)?.as_ref()?.ray(pixel)
+    }
+
+    /// Why a camera's pixel has no ray.
+    fn error(&self, camera: usize) -> LookupError {
+        if camera < self.count {
+            LookupError::Outside
+        } else {
+            LookupError::NoSuchCamera {
                 camera,
                 count: self.count,
-            });
-        };
-        prepared.ray(pixel).ok_or(LookupError::Outside)
+            }
+        }
     }
 }
 
