@@ -13,7 +13,7 @@ use cost::InQemu;
 use firmware_sim::simulated::flash_file::{self, FlashFile};
 use firmware_sim::simulated::host::SimulatedDevice;
 use firmware_sim::simulated::qemu::{self, QemuDevice};
-use ray_device::protocol::{CameraStatus, MAX_CAMERAS_LISTED, MAX_NAME, Rig, name};
+use ray_device::protocol::{Arithmetic, CameraStatus, MAX_CAMERAS_LISTED, MAX_NAME, Rig, name};
 use ray_device::storage::trust::{PublicKey, Trust};
 
 /// A measuring device, simulated.
@@ -29,7 +29,13 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     /// The device on this computer.
-    Host(DeviceArguments),
+    Host {
+        #[command(flatten)]
+        device: DeviceArguments,
+        /// What it computes points in; integer is for cores without a floating-point unit.
+        #[arg(long, value_enum, default_value = "f32")]
+        arithmetic: ArithmeticArg,
+    },
     /// The same application as a Cortex-M4F image in QEMU; the image is built first when it is
     /// missing or stale.
     Qemu {
@@ -52,6 +58,15 @@ enum Command {
         #[arg(long, conflicts_with = "json")]
         markdown: bool,
     },
+}
+
+/// What a device computes in.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum ArithmeticArg {
+    /// Numbers of 32 bits with a floating point
+    F32,
+    /// Integers: no standard deviations
+    Integer,
 }
 
 #[derive(clap::Args)]
@@ -159,7 +174,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), Failure> {
     match &arguments.command {
-        Command::Host(device) => run_on_host(device),
+        Command::Host { device, arithmetic } => run_on_host(device, *arithmetic),
         Command::Qemu { device, image } => run_in_qemu(device, image.as_deref()),
         Command::Cost {
             blobs,
@@ -185,10 +200,14 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-fn run_on_host(arguments: &DeviceArguments) -> Result<(), Failure> {
+fn run_on_host(arguments: &DeviceArguments, arithmetic: ArithmeticArg) -> Result<(), Failure> {
     let FlashFile { flash, kept_in } = arguments.flash()?;
     let trust = arguments.public_key.map_or(Trust::Anybody, Trust::Signed);
-    let device = SimulatedDevice::start_trusting(arguments.listen, flash, trust)
+    let arithmetic = match arithmetic {
+        ArithmeticArg::F32 => Arithmetic::Float,
+        ArithmeticArg::Integer => Arithmetic::Integer,
+    };
+    let device = SimulatedDevice::start_device(arguments.listen, flash, trust, arithmetic)
         .map_err(|error| format!("the device on {}: {error}", arguments.listen))?;
     announce(device.address())?;
     device.serve_forever();

@@ -147,7 +147,13 @@ pub fn flash() -> &'static [u8] {
 /// splits it into regions, so that none can be written while it is borrowed for reading.
 pub fn flash_to_write() -> Option<&'static mut [u8]> {
     static IS_TAKEN: AtomicBool = AtomicBool::new(false);
-    if IS_TAKEN.swap(true, Ordering::Relaxed) {
+    // A core without an atomic swap has one processor, and no interrupt comes between.
+    let was_taken = cortex_m::interrupt::free(|_| {
+        let was_taken = IS_TAKEN.load(Ordering::Relaxed);
+        IS_TAKEN.store(true, Ordering::Relaxed);
+        was_taken
+    });
+    if was_taken {
         return None;
     }
     // SAFETY: as for `flash`, and nobody else has a reference to it: this one is handed out once,

@@ -12,6 +12,8 @@ mod cost;
 #[cfg(feature = "command")]
 mod flashing;
 #[cfg(feature = "command")]
+mod integer;
+#[cfg(feature = "command")]
 mod qemu;
 #[cfg(feature = "command")]
 mod running;

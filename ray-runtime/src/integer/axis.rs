@@ -175,21 +175,36 @@ mod tests {
 
     #[test]
     fn borders_belong_to_the_cell_behind_and_the_far_edge_to_the_last() {
-        for (first, extent, cells) in [(0, 64, 5), (10, 1280, 30), (0, 6001, 97), (0, 32_768, 1024), (3, 1, 1)] {
+        for (first, extent, cells) in [
+            (0, 64, 5),
+            (10, 1280, 30),
+            (0, 6001, 97),
+            (0, 32_768, 1024),
+            (3, 1, 1),
+        ] {
             let numbers = format::Axis::new(first, extent, cells, cells);
             let axis = Axis::prepare(numbers, cells, cells).unwrap();
             let edge = (first << 16).cast_signed() - 32_768;
             let step = (extent / 700).max(1);
             for pixel in (0..extent).step_by(step as usize) {
                 // The center of a pixel may lie on a border.
-                let place = axis.place(edge + (pixel << 16).cast_signed() + 32_768).unwrap();
-                assert_eq!(axis.mask_cell(place), (2 * pixel + 1) * cells / (2 * extent));
+                let place = axis
+                    .place(edge + (pixel << 16).cast_signed() + 32_768)
+                    .unwrap();
+                assert_eq!(
+                    axis.mask_cell(place),
+                    (2 * pixel + 1) * cells / (2 * extent)
+                );
                 let exact = (f64::from(pixel) + 0.5) / f64::from(extent);
                 assert!((f64::from(place.0) / 2.0f64.powi(31) - exact).abs() < 1e-8);
                 let share = f64::from(axis.cell_and_share(place).1) / 2.0f64.powi(30);
                 let cell = numbers.cell_and_share(pixel as f32 + first as f32, cells);
                 assert_eq!(axis.cell_and_share(place).0 as usize, cell.0);
-                assert!((share - f64::from(cell.1)).abs() < 2e-4, "{share} {}", cell.1);
+                assert!(
+                    (share - f64::from(cell.1)).abs() < 2e-4,
+                    "{share} {}",
+                    cell.1
+                );
             }
             let end = edge + ((extent - 1) << 16).cast_signed() + 65_535;
             let last = axis.place(end.wrapping_add(1)).unwrap();

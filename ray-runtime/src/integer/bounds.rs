@@ -6,6 +6,7 @@ use crate::format::{
     Record, coefficient_count,
 };
 use crate::lookup::Views;
+use core::num::NonZero;
 
 /// Digits behind the point in which magnitudes are added: lengths of up to 1e6 mm fit.
 const LENGTH: i32 = 8;
@@ -45,13 +46,22 @@ impl Bounds {
                     add(map, times(sum(&[*knot], *digits.get(map)?), 2));
                 }
             }
-            // Shares are up to 1.25, and so their products of three below 2.
+            // Shares are up to 1.25, and so their products of three below 2; nothing is multiplied with the last.
             Form::Patches => {
                 let len = PATCH_LEN / ALIGNMENT;
                 let patches = pairs.get(..cells_u * cells_v * maps * len)?;
                 for (at, patch) in patches.chunks_exact(len).enumerate() {
-                    let map = at % maps;
-                    add(map, times(sum(patch, *digits.get(map)?), 2));
+                    let (cell, map) = (at / maps, at % maps);
+                    // Where nothing is calibrated a patch may be anything.
+                    if !is_used(views, record, cell as u32) {
+                        continue;
+                    }
+                    let (last, bent) = patch.split_last()?;
+                    let digits = *digits.get(map)?;
+                    add(
+                        map,
+                        times(sum(bent, digits), 2).saturating_add(sum(&[*last], digits)),
+                    );
                 }
             }
             Form::Quantized => {
@@ -62,14 +72,19 @@ impl Bounds {
                         let digits = *digits.get(map)?;
                         let count = coefficient_count(of.degree.into());
                         let coefficients = pairs.get(start..)?.get(..count)?;
-                        add(map, sum(coefficients, digits).saturating_add(knots(of, digits)));
+                        add(
+                            map,
+                            sum(coefficients, digits).saturating_add(knots(of, digits)),
+                        );
                         start += count;
                     }
                 }
             }
         }
         let [angle, offset] = sums;
-        let at = record.translation_mm().map(|number| Digits::new(LENGTH).magnitude(number));
+        let at = record
+            .translation_mm()
+            .map(|number| Digits::new(LENGTH).magnitude(number));
         // An offset across is as long as its two parts times 1 + 4, as directions go to 127 degrees.
         let [x, y, z] = at;
         Some(Self {
@@ -82,6 +97,28 @@ impl Bounds {
     pub fn has_angles(&self) -> bool {
         self.angle < MOST_ANGLE
     }
+}
+
+/// Whether a cell of the table has a part of a mask's cell in it that is calibrated.
+fn is_used(views: Views<'_>, record: Record<'_>, cell: u32) -> bool {
+    let ([cells_u, cells_v], [mask_u, mask_v]) = (record.cells(), record.mask_cells());
+    let (Some(along_u), Some(along_v)) = (NonZero::new(cells_u), NonZero::new(cells_v)) else {
+        return false;
+    };
+    let range = |cell: u32, cells: NonZero<u32>, mask: u32| {
+        let end = (cell + 1) * mask + (cells.get() - 1);
+        (cell * mask) / cells..end / cells
+    };
+    let mut rows = range(cell / along_u, along_v, mask_v);
+    rows.any(|row| {
+        range(cell % along_u, along_u, mask_u).any(|column| {
+            let bit = row * mask_u + column;
+            let byte = views
+                .bytes
+                .get((record.mask_offset() + (bit >> 3)) as usize);
+            byte.is_some_and(|byte| byte >> (bit & 7) & 1 == 1)
+        })
+    })
 }
 
 /// Binary digits behind the point of millimeters such that lengths have 28 before it; `None` if there are none
@@ -101,7 +138,9 @@ fn sum(pairs: &[[f32; 2]], digits: i32) -> u32 {
     let digits = Digits::new(digits);
     let add = |k: usize| {
         let numbers = pairs.iter().map(|[a, b]| if k == 0 { *a } else { *b });
-        numbers.fold(0_u32, |sum, number| sum.saturating_add(digits.magnitude(number)))
+        numbers.fold(0_u32, |sum, number| {
+            sum.saturating_add(digits.magnitude(number))
+        })
     };
     add(0).max(add(1))
 }

@@ -70,7 +70,11 @@ impl Unit {
         let down = -(exponent + 33 + digits);
         let is_some = unit.to_bits() != 0 && (-31..32).contains(&down);
         Self {
-            digits: if is_some { (word >> 1).cast_signed() } else { 0 },
+            digits: if is_some {
+                (word >> 1).cast_signed()
+            } else {
+                0
+            },
             down: if is_some { down } else { 0 },
         }
     }
@@ -128,7 +132,10 @@ impl<'a> Camera<'a> {
         let [axis_u, axis_v] = &self.axes;
         let (u, v) = (axis_u.place(pixel.u)?, axis_v.place(pixel.v)?);
         let bit = axis_v.mask_cell(v) * axis_u.mask_cells() + axis_u.mask_cell(u);
-        let byte = self.views.bytes.get((self.mask_offset + (bit >> 3)) as usize)?;
+        let byte = self
+            .views
+            .bytes
+            .get((self.mask_offset + (bit >> 3)) as usize)?;
         if byte >> (bit & 7) & 1 == 0 {
             return None;
         }
@@ -181,7 +188,11 @@ impl<'a> Camera<'a> {
 
     fn window(&self, u: Place, v: Place) -> knots::Window {
         let [axis_u, axis_v] = &self.axes;
-        knots::Window::at(self.axes[0].cells(), axis_u.knot_place(u), axis_v.knot_place(v))
+        knots::Window::at(
+            self.axes[0].cells(),
+            axis_u.knot_place(u),
+            axis_v.knot_place(v),
+        )
     }
 
     /// A quantized table of any kind.
@@ -192,8 +203,12 @@ impl<'a> Camera<'a> {
             let coefficients = pairs
                 .get(start..)?
                 .get(..coefficient_count(map.degree.into()))?;
-            let sums =
-                polynomial::any(coefficients, Digits::new(digits), u.centered(), v.centered());
+            let sums = polynomial::any(
+                coefficients,
+                Digits::new(digits),
+                u.centered(),
+                v.centered(),
+            );
             if map.number_len == 0 {
                 return Some(sums);
             }
@@ -206,8 +221,8 @@ impl<'a> Camera<'a> {
         let start = QUANTIZED_HEADER_PAIRS;
         let behind = start + coefficient_count(direction.degree.into());
         let cells_v = self.axes[1].cells();
-        let offset_knots =
-            knots + knots_len([self.axes[0].cells(), cells_v], direction.number_len).div_ceil(ALIGNMENT);
+        let offset_knots = knots
+            + knots_len([self.axes[0].cells(), cells_v], direction.number_len).div_ceil(ALIGNMENT);
         Some(Sample {
             s: value(direction, start, knots, 28)?,
             n: if self.is_central {

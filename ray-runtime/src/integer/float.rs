@@ -114,14 +114,16 @@ mod tests {
         let twenty_eight = Digits::new(28);
         for _ in 0..100_000 {
             let exponent = 90 + (random.next() % 40) as u32;
-            let number =
-                f32::from_bits(exponent << 23 | random.next() as u32 & 0x807f_ffff);
+            let number = f32::from_bits(exponent << 23 | random.next() as u32 & 0x807f_ffff);
             let exact = f64::from(number) * f64::from(1 << 28);
             assert_eq!(twenty_eight.fixed(number), exact as i32, "{number}");
             let magnitude = f64::from(twenty_eight.magnitude(number));
             assert!(magnitude >= exact.abs() && magnitude <= exact.abs() + 1.0);
             let (word, exponent) = normalized(number.abs());
-            assert_eq!(f64::from(word) * 2.0f64.powi(exponent), f64::from(number.abs()));
+            assert_eq!(
+                f64::from(word) * 2.0f64.powi(exponent),
+                f64::from(number.abs())
+            );
         }
         assert_eq!(twenty_eight.fixed(0.0), 0);
         assert_eq!(twenty_eight.magnitude(-0.0), 0);

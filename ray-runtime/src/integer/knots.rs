@@ -35,7 +35,12 @@ impl Window {
 
     /// The knots of i8, or of i16 where a number does not have one byte.
     #[inline(never)]
-    pub fn blend(&self, pairs: &[[f32; 2]], knots_start: usize, number_len: u8) -> Option<[i32; 2]> {
+    pub fn blend(
+        &self,
+        pairs: &[[f32; 2]],
+        knots_start: usize,
+        number_len: u8,
+    ) -> Option<[i32; 2]> {
         if number_len != 1 {
             return self.blend_words(pairs, knots_start);
         }

@@ -82,7 +82,9 @@ pub fn meet(
     }
     // No finer than the unit of the origins.
     let down = up.wrapping_add(zeros).wrapping_add(1);
-    let finer = leading_zeros((l1 | l2).cast_unsigned()).wrapping_sub(2).min(down);
+    let finer = leading_zeros((l1 | l2).cast_unsigned())
+        .wrapping_sub(2)
+        .min(down);
     let down = down.wrapping_sub(finer);
     let end = |o: &[i32; 3], d: &[i32; 3], l: i32| -> [i32; 3] {
         let lambda = product::<1>(l << (finer & 31), inverse);

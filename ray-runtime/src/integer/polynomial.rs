@@ -14,7 +14,10 @@ const STRIDED: usize = 2 * CUBIC - 1;
 #[inline(always)]
 pub fn prepared_cubic(coefficients: &[[i32; 2]; CUBIC], x: i32, y: i32) -> Option<[i32; 2]> {
     let [first, second] = channels(coefficients)?;
-    Some([prepared_channel(first, x, y), prepared_channel(second, x, y)])
+    Some([
+        prepared_channel(first, x, y),
+        prepared_channel(second, x, y),
+    ])
 }
 
 /// The two channels, each with the other's numbers in between.
@@ -26,7 +29,27 @@ fn channels<T>(coefficients: &[[T; 2]; CUBIC]) -> Option<[&[T; STRIDED]; 2]> {
 
 #[inline(never)]
 fn prepared_channel(c: &[i32; STRIDED], x: i32, y: i32) -> i32 {
-    let [y3, _, y2x, _, y2, _, yx2, _, yx, _, y1, _, x3, _, x2, _, x1, _, one] = *c;
+    let [
+        y3,
+        _,
+        y2x,
+        _,
+        y2,
+        _,
+        yx2,
+        _,
+        yx,
+        _,
+        y1,
+        _,
+        x3,
+        _,
+        x2,
+        _,
+        x1,
+        _,
+        one,
+    ] = *c;
     let step = |a: i32, by: i32, b: i32| product::<1>(a, by).wrapping_add(b);
     let of_y2 = step(y3, y, step(y2x, x, y2));
     let of_y = step(of_y2, y, step(step(yx2, x, yx), x, y1));
@@ -49,7 +72,11 @@ impl Shares {
         let half = |share: i32| share.wrapping_add(1 << 14).cast_unsigned() >> 15;
         let (half_x, half_y) = (half(x), half(y));
         let times = |a: u32, b: u32| a.wrapping_mul(b) >> 15;
-        let (xx, xy, yy) = (times(half_x, half_x), times(half_x, half_y), times(half_y, half_y));
+        let (xx, xy, yy) = (
+            times(half_x, half_x),
+            times(half_x, half_y),
+            times(half_y, half_y),
+        );
         Self {
             x,
             y,
@@ -88,7 +115,27 @@ fn patch_channel(c: &[f32; STRIDED], digits: Digits, shares: &Shares) -> i32 {
     let short = digits.for_short_products();
     let bent = |number: f32, power: u32| short.short_product(number, power);
     let straight = |number: f32, share: i32| product::<2>(digits.fixed(number), share);
-    let [y3, _, y2x, _, y2, _, yx2, _, yx, _, y1, _, x3, _, x2, _, x1, _, one] = c;
+    let [
+        y3,
+        _,
+        y2x,
+        _,
+        y2,
+        _,
+        yx2,
+        _,
+        yx,
+        _,
+        y1,
+        _,
+        x3,
+        _,
+        x2,
+        _,
+        x1,
+        _,
+        one,
+    ] = c;
     let mut sum = digits.fixed(*one);
     let mut add = |part: i32| sum = sum.wrapping_add(part);
     add(straight(*x1, shares.x));

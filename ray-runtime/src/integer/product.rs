@@ -90,7 +90,10 @@ mod tests {
             let exact = i64::from(a) * i64::from(b);
             for (kept, found) in [(0, product::<0>(a, b)), (2, product::<2>(a, b))] {
                 let below = (exact >> (32 - kept)) - i64::from(found);
-                assert!((0..=2 + (1 << kept)).contains(&below), "{a} {b} {kept} {below}");
+                assert!(
+                    (0..=2 + (1 << kept)).contains(&below),
+                    "{a} {b} {kept} {below}"
+                );
             }
             let half = b >> 12;
             let exact = i64::from(a) * i64::from(half);

@@ -49,6 +49,11 @@ pub struct Sample {
     pub n: [i32; 2],
 }
 
+/// The largest square of a half-angle vector, in 2^-24.
+const MOST_SQUARE: u32 = 16 << 24;
+/// What the products are below the exact ones at most, and more.
+const BELOW_ZERO: i32 = 8;
+
 /// Origin and direction of a sample's ray. `None` further than 127 degrees off the camera's axis, where the
 /// direction has no place in its digits.
 #[inline(always)]
@@ -56,12 +61,13 @@ pub fn ray(pose: &Pose, sample: Sample, is_central: bool) -> Option<([i32; 3], [
     let [s1, s2] = sample.s;
     // In 2^-24.
     let (square1, square2) = (product::<0>(s1, s1), product::<0>(s2, s2));
-    let square = square1.wrapping_add(square2).cast_unsigned();
-    if square > 16 << 24 {
+    let square = square1.wrapping_add(square2);
+    // As a number without a sign, for up to 128; the products of small numbers may be some steps below zero.
+    if square.wrapping_add(BELOW_ZERO).cast_unsigned() > MOST_SQUARE + BELOW_ZERO.cast_unsigned() {
         return None;
     }
     // A quarter, in 2^-28.
-    let drop = (square << 2).cast_signed();
+    let drop = square << 2;
     let mut direction = [0; 3];
     let (rows, _) = pose.rotation.as_chunks::<3>();
     for (component, [r1, r2, r3]) in direction.iter_mut().zip(rows) {
@@ -75,7 +81,9 @@ pub fn ray(pose: &Pose, sample: Sample, is_central: bool) -> Option<([i32; 3], [
         let half = product::<3>(s1, s2).wrapping_neg();
         let x = n1.wrapping_add(product::<4>(difference, n1).wrapping_add(product::<4>(half, n2)));
         let y = n2.wrapping_add(product::<4>(half, n1).wrapping_sub(product::<4>(difference, n2)));
-        let z = product::<4>(s1, n1).wrapping_add(product::<4>(s2, n2)).wrapping_neg();
+        let z = product::<4>(s1, n1)
+            .wrapping_add(product::<4>(s2, n2))
+            .wrapping_neg();
         for (component, [r1, r2, r3]) in origin.iter_mut().zip(rows) {
             let across = product::<2>(*r1, x).wrapping_add(product::<2>(*r2, y));
             *component = component.wrapping_add(across.wrapping_add(product::<2>(*r3, z)));

@@ -79,8 +79,8 @@ impl<'a, const N: usize> Rig<'a, N> {
             }
         }
         let bounds = (0..count).filter_map(|camera| bounds_of(blob, camera));
-        let digits = bounds::length_digits(bounds, blob.working_distance_mm())
-            .ok_or(Unsuited::Lengths)?;
+        let digits =
+            bounds::length_digits(bounds, blob.working_distance_mm()).ok_or(Unsuited::Lengths)?;
         let mut cameras = [None; N];
         for (camera, place) in cameras.iter_mut().enumerate().take(count) {
             let prepared = blob

@@ -5,6 +5,8 @@ mod cpp_interface;
 mod damage;
 mod document;
 mod golden;
+#[cfg(feature = "integer")]
+mod integer;
 mod project;
 mod questions;
 mod sections;
