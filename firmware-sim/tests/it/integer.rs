@@ -107,8 +107,8 @@ fn a_device_measures_in_integers_and_says_so() {
     }
 }
 
-/// The image for a target, and what it prints on one of QEMU's machines.
-fn printed(target: &str, machine: [&str; 2]) -> String {
+/// The image of this name for a target.
+fn build(image: &str, target: &str) -> PathBuf {
     let script = root().join("scripts/embedded-cargo.sh");
     let folder = root().join("target/embedded/integer");
     let is_built = Command::new(script)
@@ -120,16 +120,23 @@ fn printed(target: &str, machine: [&str; 2]) -> String {
             "--features",
             "integer",
         ])
-        .args(["--bin", "integer_bits", "--target", target, "--target-dir"])
+        .args(["--bin", image, "--target", target, "--target-dir"])
         .arg(&folder)
         .stdout(std::io::stderr())
         .status()
         .unwrap();
     assert!(is_built.success());
-    let image = folder.join(target).join("release/integer_bits");
+    folder.join(target).join("release").join(image)
+}
+
+/// What an image prints on one of QEMU's machines.
+fn printed(image: &str, target: &str, machine: [&str; 2]) -> String {
+    let image = build(image, target);
     let [machine, cpu] = machine;
     let output = Command::new("timeout")
         .args(["300", "qemu-system-arm", "-machine", machine, "-cpu", cpu])
+        // An instruction takes 1024 ns.
+        .args(["-icount", "shift=10"])
         .args(["-display", "none", "-monitor", "none", "-serial", "none"])
         .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
         .arg(image)
@@ -176,6 +183,36 @@ fn integers_give_the_same_bits_on_the_host_a_cortex_m4f_and_a_core_without_a_flo
         ("thumbv7em-none-eabihf", ["mps2-an386", "cortex-m4"]),
         ("thumbv6m-none-eabi", ["mps2-an385", "cortex-m3"]),
     ] {
-        assert_eq!(printed(target, machine), here, "{target}");
+        assert_eq!(printed("integer_bits", target, machine), here, "{target}");
     }
+}
+
+/// Code of the Cortex-M0, on a core that runs the same instructions beside a SysTick of 25 MHz.
+#[test]
+fn points_in_integers_take_a_tenth_of_the_instructions_of_f32_in_software() {
+    let counts = printed(
+        "counting_integer",
+        "thumbv6m-none-eabi",
+        ["mps2-an385", "cortex-m3"],
+    );
+    for (name, most) in [
+        ("central-v3-fast", 2500),
+        ("non-central-v3-fast", 4000),
+        ("non-central-v3-cubic", 4400),
+        ("non-central-v3-small", 10_500),
+    ] {
+        let line = counts.lines().find(|line| line.starts_with(name)).unwrap();
+        let mut numbers = line
+            .split(' ')
+            .skip(1)
+            .map(|word| word.parse::<u32>().unwrap());
+        let [matches, _, point] = [0; 3].map(|_| numbers.next().unwrap());
+        assert!(matches > 10 && point <= most && point > 1000, "{line}");
+    }
+}
+
+/// It links only if no panic is reachable.
+#[test]
+fn no_panic_is_reachable_in_integers() {
+    build("footprint_integer", "thumbv6m-none-eabi");
 }

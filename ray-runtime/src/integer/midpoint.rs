@@ -109,6 +109,9 @@ const CLOSE: u32 = 7;
 /// Square of the least sine, in 2^-40.
 const LEAST: u32 = (MIN_PARALLAX_SIN * MIN_PARALLAX_SIN * (1_u64 << 40) as f32) as u32;
 
+// As `FORMAT.md` states it.
+const _: () = assert!(LEAST == 43_980);
+
 /// Whether the sine of the angle between two directions is at most [`MIN_PARALLAX_SIN`], by 16 binary digits of
 /// each number.
 #[inline(never)]

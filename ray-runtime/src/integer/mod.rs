@@ -17,7 +17,7 @@
 //! )));
 //!
 //! let blob = RayBlob::open(&RIG.0).unwrap();
-//! // Prepared once: two cameras take 700 bytes.
+//! // Prepared once: two cameras take some 700 bytes.
 //! let rig = Rig::<2>::prepare(&blob).unwrap();
 //! let (left, right) = (PixelPoint::new(30.0, 20.5), PixelPoint::new(33.0, 21.0));
 //! let point = rig.triangulate((0, left), (1, right)).unwrap();
