@@ -5,7 +5,6 @@
 //! (`pip install opencv-python-headless numpy`).
 
 use calib_blob::pack::read_aligned;
-use nalgebra::Vector3;
 use ray_runtime::{PixelPoint, RayBlob};
 use std::fmt::Write as _;
 use std::hint::black_box;
@@ -110,12 +109,12 @@ fn matches(blob: &RayBlob<'_>) -> Vec<[PixelPoint; 2]> {
     let spread = |k: usize, step: f64, extent: f64| ((k as f64 * step).fract() - 0.5) * extent;
     let seen: Vec<[PixelPoint; 2]> = (0..20_000)
         .filter_map(|k| {
-            let point = Vector3::new(
+            let point_mm = [
                 (60.0 + spread(k, 0.618, 80.0)) as f32,
                 (70.0 + spread(k, 0.414, 80.0)) as f32,
                 spread(k, 0.732, 40.0) as f32,
-            );
-            let pixels = [0, 1].map(|camera| blob.project(camera, &point).ok());
+            ];
+            let pixels = [0, 1].map(|camera| blob.project(camera, point_mm).ok());
             Some([pixels[0]?, pixels[1]?])
         })
         .collect();

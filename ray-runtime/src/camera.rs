@@ -1,7 +1,6 @@
 //! What a blob says of one camera.
 
 use crate::format::{CameraMeta, Encoding, Form, Record};
-use nalgebra::{Matrix3, Vector3};
 
 /// A camera of a blob.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,10 +39,10 @@ pub struct Region {
 /// `point_in_rig = rotation * point_in_camera + translation_mm`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RigFromCamera {
-    /// Orthonormal to f32 round-off.
-    pub rotation: Matrix3<f32>,
+    /// Row by row; orthonormal to f32 round-off.
+    pub rotation: [[f32; 3]; 3],
     /// The camera's reference point in the rig frame, mm.
-    pub translation_mm: Vector3<f32>,
+    pub translation_mm: [f32; 3],
 }
 
 impl<'a> Camera<'a> {
@@ -66,8 +65,8 @@ impl<'a> Camera<'a> {
             cells: record.cells(),
             mask_cells: record.mask_cells(),
             rig_from_camera: RigFromCamera {
-                rotation: Matrix3::new(r11, r12, r13, r21, r22, r23, r31, r32, r33),
-                translation_mm: record.translation_mm().into(),
+                rotation: [[r11, r12, r13], [r21, r22, r23], [r31, r32, r33]],
+                translation_mm: record.translation_mm(),
             },
         }
     }

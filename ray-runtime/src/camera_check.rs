@@ -25,11 +25,17 @@ impl CameraCheck<'_> {
     pub fn run(&self, meta: &CameraMeta<'_>, start: usize) -> Result<usize, OpenError> {
         let (record, bytes) = (self.record, self.views.bytes);
         let encoding = Encoding::from_number(record.encoding())
-            .filter(|encoding| encoding.since_version() <= self.version && encoding.is_read())
+            .filter(|encoding| encoding.since_version() <= self.version)
             .ok_or(OpenError::UnknownEncoding {
                 camera: self.camera,
                 found: record.encoding(),
             })?;
+        if !encoding.is_read() {
+            return Err(OpenError::FormLeftOut {
+                camera: self.camera,
+                found: record.encoding(),
+            });
+        }
         let (cells, mask_cells) = (record.cells(), record.mask_cells());
         let is_count = |count: &u32| (1..=MAX_CELLS).contains(count);
         if !(cells.iter().chain(&mask_cells).all(is_count) && record.reserved() == 0) {
@@ -54,7 +60,9 @@ impl CameraCheck<'_> {
                 self.check_numbers(start, start.saturating_add(len))?;
                 start.saturating_add(len)
             }
-            None => self.check_quantized(encoding, meta, start)?,
+            // Never where the form is left out, so that nothing of it is linked.
+            None if cfg!(feature = "quantized") => self.check_quantized(encoding, meta, start)?,
+            None => return Err(self.layout(Table::Grid)),
         };
 
         let mask_start = format::aligned(grid_end);

@@ -9,6 +9,7 @@ use crate::format::{
 };
 use crate::match_noise::MatchNoise;
 use crate::uncertainty::Pair;
+use crate::vector::Vector;
 
 /// The header, if magic and version are right.
 pub(crate) fn recognized_header(bytes: &[u8]) -> Result<Header, OpenError> {
@@ -30,8 +31,9 @@ pub(crate) fn recognized_header(bytes: &[u8]) -> Result<Header, OpenError> {
     Ok(header)
 }
 
-/// The header of bytes that have the length and the checksum it states.
-pub(crate) fn checked_header(bytes: &[u8]) -> Result<Header, OpenError> {
+/// The header of bytes that have the length and the checksum it states. The checksum is computed, unless
+/// that of all bytes is known.
+pub(crate) fn checked_header(bytes: &[u8], crc_of_all: Option<u32>) -> Result<Header, OpenError> {
     let header = recognized_header(bytes)?;
     let (need, have) = (
         header.total_len,
@@ -43,7 +45,11 @@ pub(crate) fn checked_header(bytes: &[u8]) -> Result<Header, OpenError> {
     if have > need {
         return Err(OpenError::TrailingBytes { need, have });
     }
-    let computed = format::checksum(bytes).ok_or(OpenError::BadHeader)?;
+    let computed = match crc_of_all {
+        Some(crc) => format::checksum_from_all(bytes, crc),
+        None => format::checksum(bytes),
+    };
+    let computed = computed.ok_or(OpenError::BadHeader)?;
     if computed != header.crc {
         return Err(OpenError::BadCrc {
             stated: header.crc,
@@ -207,14 +213,14 @@ pub(crate) fn same_bits(a: Axis, b: Axis) -> bool {
 /// Whether the rows are orthonormal and right-handed to within the round-off of f32 entries.
 pub(crate) fn is_rotation([a, b, c, d, e, f, g, h, i]: [f32; 9]) -> bool {
     const TOLERANCE: f32 = 1e-5;
-    let [x, y, z] = [[a, b, c], [d, e, f], [g, h, i]].map(nalgebra::Vector3::from);
+    let [x, y, z] = [[a, b, c], [d, e, f], [g, h, i]].map(Vector::from);
     // NaN is near nothing.
     let is_near = |value: f32, goal: f32| (goal - TOLERANCE..=goal + TOLERANCE).contains(&value);
     is_near(x.norm_squared(), 1.0)
         && is_near(y.norm_squared(), 1.0)
         && is_near(z.norm_squared(), 1.0)
-        && is_near(x.dot(&y), 0.0)
-        && is_near(y.dot(&z), 0.0)
-        && is_near(z.dot(&x), 0.0)
-        && is_near(x.cross(&y).dot(&z), 1.0)
+        && is_near(x.dot(y), 0.0)
+        && is_near(y.dot(z), 0.0)
+        && is_near(z.dot(x), 0.0)
+        && is_near(x.cross(y).dot(z), 1.0)
 }

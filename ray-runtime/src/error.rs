@@ -74,6 +74,14 @@ pub enum OpenError {
         /// The encoding's number.
         found: u32,
     },
+    /// A camera's table is of a form that this library was built without: build it with the feature
+    /// `patches`, `quantized` or `old-versions`, or pack the blob in another form.
+    FormLeftOut {
+        /// Index of the camera.
+        camera: u16,
+        /// The encoding's number.
+        found: u32,
+    },
     /// A table's place or size does not fit the blob or the camera it belongs to.
     BadLayout {
         /// Index of the camera.
@@ -125,6 +133,7 @@ impl OpenError {
             Self::BadPair { .. } => 13,
             Self::BadSection { .. } => 14,
             Self::UnknownSection { .. } => 15,
+            Self::FormLeftOut { .. } => 17,
         }
     }
 }
@@ -321,6 +330,11 @@ mod tests {
             OpenError::UnknownSection { tag: 2 },
         ];
         assert!(open.iter().map(|e| e.code()).eq(1..=15));
+        let left_out = OpenError::FormLeftOut {
+            camera: 0,
+            found: 0,
+        };
+        assert_eq!(left_out.code(), 17);
         assert_eq!(LookupError::Outside.code(), 64);
         assert_eq!(
             LookupError::NoSuchCamera {

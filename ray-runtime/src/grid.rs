@@ -15,13 +15,47 @@ pub(crate) struct Place {
     pub weights: [f32; 3],
 }
 
+/// A coordinate in the region, from its first edge.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Inside {
+    pub from_edge_px: f32,
+    /// The same, but on the very edge a little before it: the product with cells per pixel is below their
+    /// number, and nothing has to see to that.
+    pub for_cells_px: f32,
+}
+
+/// So many of the last numbers before the far edge belong to it. A cell is at least a 1024th of the
+/// region, and so much larger; what is rounded is less than three of them.
+const EDGE: u32 = 16;
+
+/// Apart, as hardly any pixel needs it.
+#[cold]
+#[inline(never)]
+fn is_outside(bits: u32, extent_bits: u32) -> bool {
+    bits > extent_bits
+}
+
 impl Axis {
-    /// Whether the coordinate lies between the region's outer edges; NaN does not.
+    /// Where a coordinate lies between the region's outer edges; `None` if it does not, as NaN.
     ///
     /// Numbers from zero on are in the order of their bits, and all others have larger ones: one
     /// comparison of integers takes the place of two of numbers.
-    pub(crate) fn contains(&self, coordinate_px: f32) -> bool {
-        (coordinate_px - self.min_px).to_bits() <= (self.max_px - self.min_px).to_bits()
+    #[inline(always)]
+    pub(crate) fn inside(&self, coordinate_px: f32) -> Option<Inside> {
+        let from_edge_px = coordinate_px - self.min_px;
+        let bits = from_edge_px.to_bits();
+        let extent_bits = self.extent_px().to_bits();
+        let mut for_cells_px = from_edge_px;
+        if bits > extent_bits.wrapping_sub(EDGE) {
+            if is_outside(bits, extent_bits) {
+                return None;
+            }
+            for_cells_px = f32::from_bits(extent_bits.wrapping_sub(EDGE));
+        }
+        Some(Inside {
+            from_edge_px,
+            for_cells_px,
+        })
     }
 
     /// The region's extent, px.
@@ -47,10 +81,10 @@ impl Axis {
         }
     }
 
-    /// The mask's cell at a coordinate that the axis contains.
-    pub(crate) fn mask_cell(&self, coordinate_px: f32, mask_cells: u32) -> usize {
-        let cell = ((coordinate_px - self.min_px) * self.mask_cells_per_px) as u32;
-        cell.min(mask_cells.wrapping_sub(1)) as usize
+    /// The mask's cell.
+    #[inline(always)]
+    pub(crate) fn mask_cell(&self, place: Inside) -> u32 {
+        (place.for_cells_px * self.mask_cells_per_px) as u32
     }
 
     /// The grid's cell and the weights at a coordinate that the axis contains.
@@ -67,13 +101,24 @@ impl Axis {
         }
     }
 
-    /// The grid's cell and the share of it that lies before a coordinate that the axis contains: 0 to
-    /// 1, but for what `cell_high_px` leaves out of a cell's size.
-    pub(crate) fn cell_and_share(&self, coordinate_px: f32, cells: u32) -> (usize, f32) {
-        let x = coordinate_px - self.min_px;
-        let cell = ((x * self.cells_per_px) as u32).min(cells.wrapping_sub(1));
-        let share = (x - cell as f32 * self.cell_high_px) * self.cells_per_px;
-        (cell as usize, share)
+    /// The grid's cell.
+    #[inline(always)]
+    pub(crate) fn cell(&self, place: Inside) -> u32 {
+        (place.for_cells_px * self.cells_per_px) as u32
+    }
+
+    /// Where a cell starts, seen from the region's first edge, but for what `cell_high_px` leaves out.
+    #[inline(always)]
+    pub(crate) fn cell_edge_px(&self, cell: u32) -> f32 {
+        // Below 1024: exact.
+        cell as f32 * self.cell_high_px
+    }
+
+    /// The share of the cell with this edge that lies before a place: 0 to 1, but for what
+    /// `cell_high_px` leaves out of a cell's size.
+    #[inline(always)]
+    pub(crate) fn share(&self, from_edge_px: f32, cell_edge_px: f32) -> f32 {
+        (from_edge_px - cell_edge_px) * self.cells_per_px
     }
 
     /// Derivatives of a place's weights by the coordinate, 1/px.
@@ -123,15 +168,46 @@ mod tests {
     #[test]
     fn last_edge_belongs_to_the_last_cell() {
         let axis = Axis::new(0, 641, 7, 5);
-        assert!(axis.contains(640.5) && axis.contains(-0.5));
-        assert!(!axis.contains(f32::from_bits(640.5f32.to_bits() + 1)));
-        assert!(!axis.contains(-0.5000001) && !axis.contains(f32::NAN));
-        assert!(!axis.contains(f32::INFINITY));
+        let contains = |u: f32| axis.inside(u).is_some();
+        assert!(contains(640.5) && contains(-0.5));
+        assert!(!contains(f32::from_bits(640.5f32.to_bits() + 1)));
+        assert!(!contains(-0.5000001) && !contains(f32::NAN));
+        assert!(!contains(f32::INFINITY));
         let place = axis.place(640.5, 7);
         assert_eq!(place.cell, 6);
         assert!((place.weights[2] - 1.0 / 6.0).abs() < 1e-6);
-        assert_eq!(axis.mask_cell(640.5, 5), 4);
-        assert_eq!(axis.mask_cell(-0.5, 5), 0);
+        assert_eq!(axis.mask_cell(axis.inside(640.5).unwrap()), 4);
+        assert_eq!(axis.mask_cell(axis.inside(-0.5).unwrap()), 0);
+    }
+
+    #[test]
+    fn no_place_is_behind_the_last_cell_or_before_its_own() {
+        for (extent, cells) in [
+            (1, 1),
+            (1, 1024),
+            (7, 3),
+            (641, 7),
+            (6000, 97),
+            (32768, 1024),
+            (32767, 1023),
+        ] {
+            let axis = Axis::new(0, extent, cells, cells);
+            let end = axis.max_px.to_bits();
+            for bits in end - 200..=end {
+                let u = f32::from_bits(bits);
+                let from_edge_px = u - axis.min_px;
+                let place = axis.inside(u).unwrap();
+                let clamped = |per_px: f32| ((from_edge_px * per_px) as u32).min(cells - 1);
+                assert_eq!(
+                    axis.cell(place),
+                    clamped(axis.cells_per_px),
+                    "{extent} {cells} {u}"
+                );
+                assert_eq!(axis.mask_cell(place), clamped(axis.mask_cells_per_px));
+            }
+            assert!(axis.inside(f32::from_bits(end + 8)).is_none());
+            assert!(axis.inside(f32::NAN).is_none() && axis.inside(-0.6).is_none());
+        }
     }
 
     #[test]

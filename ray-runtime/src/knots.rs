@@ -42,11 +42,26 @@ impl Window {
         knots_start: usize,
         along: [Weights; 2],
     ) -> Option<(i32, i32)> {
+        let knots = self.words(pairs, knots_start)?;
+        blend_rows(knots, self.stride.into(), along, |row| row.map(word))
+    }
+
+    /// The knots of i16 behind the first so many pairs of a table, from this window's first one on.
+    pub fn words<'a>(&self, pairs: &'a [[f32; 2]], knots_start: usize) -> Option<&'a [f32]> {
         // A knot takes half a pair.
-        let knots = pairs.as_flattened().get(2 * knots_start + self.first..)?;
-        self.blend_rows(knots, along, |row| {
-            row.map(|knot| knot.to_bits().cast_signed())
-        })
+        pairs.as_flattened().get(2 * knots_start + self.first..)
+    }
+
+    /// The 16 of a cell of the same row of cells, whose number is `cell`, in a row of knots.
+    #[inline(always)]
+    pub fn cell_knots(&self, knots: &[f32], cell: usize) -> Option<CellKnots> {
+        let knots = knots.get(cell..)?;
+        let stride = usize::from(self.stride);
+        let mut rows = [[0; 4]; 4];
+        for (j, row) in rows.iter_mut().enumerate() {
+            *row = knots.get(j * stride..)?.first_chunk()?.map(word);
+        }
+        Some(CellKnots(rows))
     }
 
     /// The same of i8, if that is what a number has bytes, or of i16.
@@ -63,32 +78,49 @@ impl Window {
         }
         let knots: &[[i8; 2]] = bytemuck::cast_slice(pairs);
         let knots = knots.get(4 * knots_start + self.first..)?;
-        self.blend_rows(knots, along, |row| {
+        blend_rows(knots, self.stride.into(), along, |row| {
             row.map(|[a, b]| (i32::from(a) & 0xffff) | i32::from(b) << 16)
         })
     }
+}
 
-    /// `words` has the two numbers of a knot in the two halves of a word.
+/// A knot of i16 as a word.
+#[inline(always)]
+fn word(knot: f32) -> i32 {
+    knot.to_bits().cast_signed()
+}
+
+/// `words` has the two numbers of a knot in the two halves of a word.
+#[inline(always)]
+fn blend_rows<K>(
+    knots: &[K],
+    stride: usize,
+    [along_u, along_v]: [Weights; 2],
+    words: impl Fn(&[K; 4]) -> [i32; 4],
+) -> Option<(i32, i32)> {
+    // One check in place of four: the compiler sees what follows from it.
+    if knots.len() < 3 * stride + 4 {
+        return None;
+    }
+    let mut sums = (0, 0);
+    for (j, weight) in along_v.each().into_iter().enumerate() {
+        let row = words(knots.get(j * stride..j * stride + 4)?.first_chunk()?);
+        // Below 2^31, as the weights add up to less than 2^16.
+        sums.0 += upper(along_u.applied_to(row.map(low)), weight);
+        sums.1 += upper(along_u.applied_to(row.map(high)), weight);
+    }
+    Some(sums)
+}
+
+/// 4 x 4 knots: the two numbers of each in the two halves of a word.
+#[derive(Clone, Copy)]
+pub(crate) struct CellKnots([[i32; 4]; 4]);
+
+impl CellKnots {
+    /// Blended with weights along u in each of the four rows, without any rounding, and then along v.
     #[inline(always)]
-    fn blend_rows<K>(
-        &self,
-        knots: &[K],
-        [along_u, along_v]: [Weights; 2],
-        words: impl Fn(&[K; 4]) -> [i32; 4],
-    ) -> Option<(i32, i32)> {
-        // One check in place of four: the compiler sees what follows from it.
-        let stride = usize::from(self.stride);
-        if knots.len() < 3 * stride + 4 {
-            return None;
-        }
-        let mut sums = (0, 0);
-        for (j, weight) in along_v.each().into_iter().enumerate() {
-            let row = words(knots.get(j * stride..j * stride + 4)?.first_chunk()?);
-            // Below 2^31, as the weights add up to less than 2^16.
-            sums.0 += upper(along_u.applied_to(row.map(low)), weight);
-            sums.1 += upper(along_u.applied_to(row.map(high)), weight);
-        }
-        Some(sums)
+    pub fn blended(&self, along: [Weights; 2]) -> Option<(i32, i32)> {
+        blend_rows(self.0.as_flattened(), 4, along, |row| *row)
     }
 }
 

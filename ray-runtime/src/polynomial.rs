@@ -130,6 +130,44 @@ pub(crate) fn cubic<T: Number>(coefficients: &[[f32; 2]; 10], x: T, y: T) -> [T;
     sums
 }
 
+/// [`cubic`] at one y: the same bits, with the product that does not depend on x computed once.
+#[derive(Clone, Copy)]
+pub(crate) struct AlongX<'a> {
+    coefficients: &'a [[f32; 2]; 10],
+    y: f32,
+    of_y3: [f32; 2],
+    /// The first of each row: the others are added, and so are copied anyway.
+    firsts: [[f32; 2]; 3],
+}
+
+impl<'a> AlongX<'a> {
+    #[inline(always)]
+    pub fn new(coefficients: &'a [[f32; 2]; 10], y: f32) -> Self {
+        let [[a, b], y2x, _, yx2, _, _, x3, ..] = *coefficients;
+        Self {
+            coefficients,
+            y,
+            of_y3: [a * y, b * y],
+            firsts: [y2x, yx2, x3],
+        }
+    }
+
+    #[inline(always)]
+    pub fn at(&self, x: f32) -> [f32; 2] {
+        let [_, _, y2, _, yx, y1, _, x2, x1, one] = self.coefficients;
+        let [y2x, yx2, x3] = &self.firsts;
+        let mut sums = self.of_y3;
+        for (k, sum) in sums.iter_mut().enumerate() {
+            let c = |pair: &[f32; 2]| if k == 0 { pair[0] } else { pair[1] };
+            let of_y2 = c(y2x) * x + c(y2);
+            let of_y = (c(yx2) * x + c(yx)) * x + c(y1);
+            let of_one = ((c(x3) * x + c(x2)) * x + c(x1)) * x + c(one);
+            *sum = ((*sum + of_y2) * self.y + of_y) * self.y + of_one;
+        }
+        sums
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -172,8 +210,11 @@ mod tests {
                     [a, b].map(f32::to_bits)
                 );
                 if let Ok(ten) = coefficients.try_into() {
-                    let cubic = cubic(ten, x, y);
-                    assert_eq!(cubic.map(f32::to_bits), [a, b].map(f32::to_bits));
+                    let cubics = [cubic(ten, x, y), AlongX::new(ten, y).at(x)];
+                    assert_eq!(
+                        cubics.map(|sums| sums.map(f32::to_bits)),
+                        [[a, b].map(f32::to_bits); 2]
+                    );
                 }
             }
         }

@@ -6,8 +6,8 @@
 
 use crate::format::Record;
 use crate::lookup::{self, MovingRay, Views};
+use crate::vector::Vector;
 use crate::{MeasureError, PixelPoint, ProjectError, Ray, RayBlob};
-use nalgebra::Vector3;
 
 /// Nodes along each axis of the region that are looked at for a start.
 const START_NODES: u16 = 5;
@@ -28,11 +28,8 @@ impl RayBlob<'_> {
     /// # Errors
     /// [`ProjectError::Unseen`] if no calibrated pixel sees the point, or none was found;
     /// [`ProjectError::NoSuchCamera`].
-    pub fn project(
-        &self,
-        camera: usize,
-        point_mm: &Vector3<f32>,
-    ) -> Result<PixelPoint, ProjectError> {
+    pub fn project(&self, camera: usize, point_mm: [f32; 3]) -> Result<PixelPoint, ProjectError> {
+        let point_mm = point_mm.into();
         let field = self.field(camera)?;
         let start = field.start(point_mm).ok_or(ProjectError::Unseen)?;
         field.refined(point_mm, start)
@@ -45,11 +42,11 @@ impl RayBlob<'_> {
     pub fn project_near(
         &self,
         camera: usize,
-        point_mm: &Vector3<f32>,
+        point_mm: [f32; 3],
         start: PixelPoint,
     ) -> Result<PixelPoint, ProjectError> {
         let field = self.field(camera)?;
-        field.refined(point_mm, field.clamped(start))
+        field.refined(point_mm.into(), field.clamped(start))
     }
 
     /// Where the ray of a pixel appears in another camera: the pixels of points on it, from `far_mm` to
@@ -75,7 +72,7 @@ impl RayBlob<'_> {
             .map_err(|error| of_lookup(error, other))?;
         let is_distance = |mm: f32| mm > 0.0 && mm.is_finite();
         let is_range = is_distance(near_mm) && is_distance(far_mm);
-        let length = libm::sqrtf(ray.direction.norm_squared());
+        let length = libm::sqrtf(Vector::from(ray.direction).norm_squared());
         let inverse = |mm: f32| length / mm;
         let steps = f32::from(count.saturating_sub(1).max(1));
         Ok(EpipolarCurve {
@@ -106,7 +103,7 @@ pub struct EpipolarPoint {
     /// Where the other camera sees it.
     pub pixel: PixelPoint,
     /// The point itself, rig frame, mm.
-    pub point_mm: Vector3<f32>,
+    pub point_mm: [f32; 3],
 }
 
 /// The image of a ray in another camera ([`RayBlob::epipolar_curve`]), from far to near.
@@ -129,11 +126,13 @@ impl Iterator for EpipolarCurve<'_> {
         while self.next < self.count {
             let lambda = 1.0 / (self.far + f32::from(self.next) * self.step);
             self.next += 1;
-            let point_mm = self.ray.origin_mm + self.ray.direction * lambda;
-            let start = self.last.or_else(|| self.field.start(&point_mm));
-            let found = start.and_then(|start| self.field.refined(&point_mm, start).ok());
+            let point_mm =
+                Vector::from(self.ray.origin_mm) + Vector::from(self.ray.direction) * lambda;
+            let start = self.last.or_else(|| self.field.start(point_mm));
+            let found = start.and_then(|start| self.field.refined(point_mm, start).ok());
             self.last = found;
             if let Some(pixel) = found {
+                let point_mm = point_mm.into();
                 return Some(EpipolarPoint { pixel, point_mm });
             }
         }
@@ -150,7 +149,7 @@ struct Field<'a> {
 
 impl Field<'_> {
     /// The calibrated node of a coarse lattice whose ray passes the point under the smallest angle.
-    fn start(&self, point_mm: &Vector3<f32>) -> Option<PixelPoint> {
+    fn start(&self, point_mm: Vector) -> Option<PixelPoint> {
         let mut best: Option<(f32, PixelPoint)> = None;
         for j in 0..START_NODES {
             for i in 0..START_NODES {
@@ -161,10 +160,10 @@ impl Field<'_> {
                 let Ok(ray) = self.views.lookup(self.record, pixel) else {
                     continue;
                 };
-                let w = point_mm - ray.origin_mm;
-                let along = w.dot(&ray.direction);
+                let direction = Vector::from(ray.direction);
+                let along = (point_mm - ray.origin_mm.into()).dot(direction);
                 // The cosine's square, with its sign, times the square of a length that hardly changes.
-                let closeness = along * libm::fabsf(along) / ray.direction.norm_squared();
+                let closeness = along * libm::fabsf(along) / direction.norm_squared();
                 if best.is_none_or(|(most, _)| closeness > most) {
                     best = Some((closeness, pixel));
                 }
@@ -173,11 +172,7 @@ impl Field<'_> {
         best.map(|(_, pixel)| pixel)
     }
 
-    fn refined(
-        &self,
-        point_mm: &Vector3<f32>,
-        start: PixelPoint,
-    ) -> Result<PixelPoint, ProjectError> {
+    fn refined(&self, point_mm: Vector, start: PixelPoint) -> Result<PixelPoint, ProjectError> {
         let mut pixel = start;
         for _ in 0..MAX_STEPS {
             let ray = self.views.lookup_moving(self.record, pixel)?;
@@ -223,20 +218,20 @@ fn limited(step_px: f32, extent_px: f32) -> f32 {
 
 /// The step of the pixel that brings the ray to the point, by least squares across the ray; `None` for
 /// a point behind the camera, and where neighboring pixels see the same.
-fn step(moving: &MovingRay, point_mm: &Vector3<f32>) -> Option<[f32; 2]> {
-    let ray = &moving.ray;
-    let w = point_mm - ray.origin_mm;
-    let inverse = 1.0 / ray.direction.norm_squared();
-    let lambda = w.dot(&ray.direction) * inverse;
+fn step(moving: &MovingRay, point_mm: Vector) -> Option<[f32; 2]> {
+    let direction = Vector::from(moving.ray.direction);
+    let w = point_mm - moving.ray.origin_mm.into();
+    let inverse = 1.0 / direction.norm_squared();
+    let lambda = w.dot(direction) * inverse;
     if !(lambda > 0.0) {
         return None;
     }
-    let missed = w - ray.direction * lambda;
+    let missed = w - direction * lambda;
     let [by_u, by_v] = moving
         .shifts_at(lambda)
-        .map(|shift| shift - ray.direction * (shift.dot(&ray.direction) * inverse));
-    let (uu, uv, vv) = (by_u.dot(&by_u), by_u.dot(&by_v), by_v.dot(&by_v));
-    let (u, v) = (by_u.dot(&missed), by_v.dot(&missed));
+        .map(|shift| shift - direction * (shift.dot(direction) * inverse));
+    let (uu, uv, vv) = (by_u.dot(by_u), by_u.dot(by_v), by_v.dot(by_v));
+    let (u, v) = (by_u.dot(missed), by_v.dot(missed));
     let determinant = uu * vv - uv * uv;
     // NaN is not above anything.
     if !(determinant > 1e-6 * (uu * vv)) {

@@ -4,10 +4,13 @@
 //! together from parts.
 
 use crate::PixelPoint;
-use crate::format::{ALIGNMENT, QUANTIZED_HEADER_PAIRS, Record, coefficient_count, knots_len};
-use crate::knots::Window;
+use crate::format::{
+    ALIGNMENT, PLACES_PER_CELL, QUANTIZED_HEADER_PAIRS, Record, coefficient_count, knots_len,
+};
+use crate::grid::Inside;
+use crate::knots::{CellKnots, Window};
 use crate::lookup::{self, Evaluated, Sample};
-use crate::polynomial::{self, Dual};
+use crate::polynomial::{self, AlongX, Dual};
 use crate::weights::Weights;
 use crate::{LookupError, Ray};
 
@@ -50,6 +53,86 @@ fn lookup_any(
 ) -> Result<Ray, LookupError> {
     let sample = Table::starting(pairs, record).and_then(|table| table.sample(from_edge));
     Ok(lookup::ray(record, sample.ok_or(LookupError::Outside)?))
+}
+
+/// A row of a usual table: what of it does not depend on u.
+#[derive(Clone, Copy)]
+pub(crate) struct UsualRow<'a> {
+    record: Record<'a>,
+    direction: AlongX<'a>,
+    offset: AlongX<'a>,
+    /// What a blend of knots counts.
+    unit: f32,
+    scale: f32,
+    places_per_px: f32,
+    along_v: Weights,
+    window: Window,
+    /// The row's first knot, and all behind it.
+    knots: &'a [f32],
+}
+
+impl<'a> UsualRow<'a> {
+    /// The row of a place along v; `None` if the table is not a usual one.
+    pub fn of(pairs: &'a [[f32; 2]], record: Record<'a>, v: Inside) -> Option<Self> {
+        let table = Table::of(pairs, record).filter(Table::is_usual)?;
+        let from_edge = PixelPoint::new(0.0, v.from_edge_px);
+        let (_, y) = table.variables(from_edge);
+        let (_, coefficients) = table.pairs.split_first_chunk::<QUANTIZED_HEADER_PAIRS>()?;
+        let (direction, rest) = coefficients.split_first_chunk::<CUBIC>()?;
+        let offset = if record.is_central() {
+            // Not asked for.
+            direction
+        } else {
+            rest.first_chunk()?
+        };
+        let window = Window::at(record, table.header[3], from_edge);
+        Some(Self {
+            record,
+            direction: AlongX::new(direction, y),
+            offset: AlongX::new(offset, y),
+            unit: table.header[1][0],
+            scale: table.header[2][0],
+            places_per_px: table.header[3][0],
+            along_v: Weights::at(window.shares[1]),
+            window,
+            knots: window.words(table.pairs, table.knots_start())?,
+        })
+    }
+
+    #[inline(always)]
+    pub fn record(&self) -> Record<'a> {
+        self.record
+    }
+
+    /// Along u.
+    #[inline(always)]
+    pub fn places_per_px(&self) -> f32 {
+        self.places_per_px
+    }
+
+    /// The knots of a cell.
+    pub fn knots(&self, cell: usize) -> Option<CellKnots> {
+        self.window.cell_knots(self.knots, cell)
+    }
+
+    /// The half-angle vector at a pixel of a cell that has these knots, and the variable of the polynomials.
+    #[inline(always)]
+    pub fn direction(&self, knots: &CellKnots, from_edge_px: f32) -> Option<([f32; 2], f32)> {
+        let place = (from_edge_px * self.places_per_px) as u32;
+        let share = place % PLACES_PER_CELL;
+        let along_u = Weights::at(share.cast_signed());
+        let left = knots.blended([along_u, self.along_v])?;
+        let x = from_edge_px * self.scale - 1.0;
+        let [a, b] = self.direction.at(x);
+        let s = [a + self.unit * left.0 as f32, b + self.unit * left.1 as f32];
+        Some((s, x))
+    }
+
+    /// The offset at a variable of the polynomials.
+    #[inline(always)]
+    pub fn offset(&self, x: f32) -> [f32; 2] {
+        self.offset.at(x)
+    }
 }
 
 /// The sample at a pixel of the region, with its derivatives by the pixel.

@@ -51,8 +51,7 @@ impl SelfTest {
             } => blob
                 .lookup(camera.into(), PixelPoint { u, v })
                 .is_ok_and(|ray| {
-                    same_bits(ray.origin_mm.into(), origin_mm)
-                        && same_bits(ray.direction.into(), direction)
+                    same_bits(ray.origin_mm, origin_mm) && same_bits(ray.direction, direction)
                 }),
             Self::Pair {
                 cameras: [camera_a, camera_b],
@@ -65,7 +64,7 @@ impl SelfTest {
                     (camera_b.into(), PixelPoint { u: u_b, v: v_b }),
                 )
                 .is_ok_and(|result| {
-                    same_bits(result.point_mm.into(), point_mm)
+                    same_bits(result.point_mm, point_mm)
                         && result.gap_squared_mm2.to_bits() == gap_squared_mm2.to_bits()
                 }),
             Self::Sigma {

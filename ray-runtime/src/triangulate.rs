@@ -3,8 +3,8 @@
 //! Plain f32 multiplications and additions in a fixed order and one division for a pair, so that
 //! every target gives the same bits.
 
+use crate::vector::Vector;
 use crate::{MeasureError, Ray};
-use nalgebra::Vector3;
 
 /// Two rays closer to parallel than this sine have no usable intersection. The host's f64
 /// triangulation uses the same number.
@@ -16,7 +16,7 @@ const MIN_PARALLAX_SIN_SQUARED: f32 = MIN_PARALLAX_SIN * MIN_PARALLAX_SIN;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Triangulation {
     /// Rig frame, mm.
-    pub point_mm: Vector3<f32>,
+    pub point_mm: [f32; 3],
     /// Square of the gap, mm2. Two rays: the gap is the length of their common perpendicular.
     /// More rays: twice the RMS distance of the point from them, which is the same for two.
     pub gap_squared_mm2: f32,
@@ -46,7 +46,7 @@ pub(crate) struct Meeting {
     /// Whether it leads from the first ray to the second along the product of the two directions.
     pub is_along_normal: bool,
     /// The product of the two directions, along it, and the inverse of its square.
-    normal: Vector3<f32>,
+    normal: Vector,
     inverse: f32,
 }
 
@@ -54,34 +54,20 @@ impl Meeting {
     /// How the middle moves with shifts of the first ray, mm per mm: half of what goes out of the
     /// rays' plane, and along the other ray what goes within it. With the normal n it is
     /// `(n (n.shift) / 2 + d2 ((n x d1).shift)) / n.n`.
-    pub fn by_shifts_of_first(
-        &self,
-        a: &Ray,
-        b: &Ray,
-        shifts: [Vector3<f32>; 2],
-    ) -> [Vector3<f32>; 2] {
-        self.by_shifts(&a.direction, &b.direction, shifts)
+    pub fn by_shifts_of_first(&self, a: &Ray, b: &Ray, shifts: [Vector; 2]) -> [Vector; 2] {
+        self.by_shifts(a.direction.into(), b.direction.into(), shifts)
     }
 
     /// The same with shifts of the second ray; exchanging the rays turns the normal round.
-    pub fn by_shifts_of_second(
-        &self,
-        a: &Ray,
-        b: &Ray,
-        shifts: [Vector3<f32>; 2],
-    ) -> [Vector3<f32>; 2] {
-        self.by_shifts(&b.direction, &-a.direction, shifts)
+    pub fn by_shifts_of_second(&self, a: &Ray, b: &Ray, shifts: [Vector; 2]) -> [Vector; 2] {
+        self.by_shifts(b.direction.into(), -Vector::from(a.direction), shifts)
     }
 
     /// How the gap, with its sign, moves with the pixels that move the middle like this, times half of
     /// the normal's length: a ray that goes out of the rays' plane takes the middle half of the way.
-    pub fn gap_by_pixels(
-        &self,
-        by_first: &[Vector3<f32>; 2],
-        by_second: &[Vector3<f32>; 2],
-    ) -> [f32; 4] {
-        let [u1, v1] = by_first.map(|by| -self.normal.dot(&by));
-        let [u2, v2] = by_second.map(|by| self.normal.dot(&by));
+    pub fn gap_by_pixels(&self, by_first: &[Vector; 2], by_second: &[Vector; 2]) -> [f32; 4] {
+        let [u1, v1] = by_first.map(|by| -self.normal.dot(by));
+        let [u2, v2] = by_second.map(|by| self.normal.dot(by));
         [u1, v1, u2, v2]
     }
 
@@ -90,16 +76,11 @@ impl Meeting {
         4.0 * self.inverse
     }
 
-    fn by_shifts(
-        &self,
-        own: &Vector3<f32>,
-        other: &Vector3<f32>,
-        shifts: [Vector3<f32>; 2],
-    ) -> [Vector3<f32>; 2] {
+    fn by_shifts(&self, own: Vector, other: Vector, shifts: [Vector; 2]) -> [Vector; 2] {
         let across = self.normal.cross(own);
         shifts.map(|shift| {
-            let out_of_plane = self.normal * (0.5 * self.normal.dot(&shift));
-            (out_of_plane + other * across.dot(&shift)) * self.inverse
+            let out_of_plane = self.normal * (0.5 * self.normal.dot(shift));
+            (out_of_plane + other * across.dot(shift)) * self.inverse
         })
     }
 }
@@ -107,23 +88,23 @@ impl Meeting {
 /// Where two rays meet.
 #[inline(always)]
 pub(crate) fn meet(a: &Ray, b: &Ray) -> Result<Meeting, MeasureError> {
-    let (d1, d2) = (a.direction, b.direction);
-    let w = b.origin_mm - a.origin_mm;
-    let normal = d1.cross(&d2);
+    let [o1, d1, o2, d2] = [a.origin_mm, a.direction, b.origin_mm, b.direction].map(Vector::from);
+    let w = o2 - o1;
+    let normal = d1.cross(d2);
     let normal_squared = normal.norm_squared();
-    if !is_wide(normal_squared, &d1, &d2) {
+    if !is_wide(normal_squared, d1, d2) {
         return Err(MeasureError::Parallel);
     }
     let inverse = 1.0 / normal_squared;
-    let lambda1 = w.cross(&d2).dot(&normal) * inverse;
-    let lambda2 = w.cross(&d1).dot(&normal) * inverse;
+    let lambda1 = w.cross(d2).dot(normal) * inverse;
+    let lambda2 = w.cross(d1).dot(normal) * inverse;
     if !(is_positive(lambda1) && is_positive(lambda2)) {
         return Err(MeasureError::Behind);
     }
-    let along = w.dot(&normal);
+    let along = w.dot(normal);
     Ok(Meeting {
         found: Triangulation {
-            point_mm: ((a.origin_mm + d1 * lambda1) + (b.origin_mm + d2 * lambda2)) * 0.5,
+            point_mm: (((o1 + d1 * lambda1) + (o2 + d2 * lambda2)) * 0.5).into(),
             gap_squared_mm2: along * along * inverse,
         },
         lambda: [lambda1, lambda2],
@@ -134,7 +115,7 @@ pub(crate) fn meet(a: &Ray, b: &Ray) -> Result<Meeting, MeasureError> {
 }
 
 /// Whether the sine between two directions is large enough; NaN counts as parallel.
-fn is_wide(normal_squared: f32, d1: &Vector3<f32>, d2: &Vector3<f32>) -> bool {
+fn is_wide(normal_squared: f32, d1: Vector, d2: Vector) -> bool {
     normal_squared > MIN_PARALLAX_SIN_SQUARED * (d1.norm_squared() * d2.norm_squared())
 }
 
@@ -160,21 +141,22 @@ pub(crate) fn triangulate_many(
     }
     let mut point = start(count, &ray)?;
     for _ in 0..STEPS {
-        point += step(count, &ray, &point)?;
+        point += step(count, &ray, point)?;
     }
     let mut distance_squared = 0.0;
     for k in 0..count {
         let ray = ray(k)?;
-        let offset = point - ray.origin_mm;
-        let along = offset.dot(&ray.direction);
+        let direction = Vector::from(ray.direction);
+        let offset = point - ray.origin_mm.into();
+        let along = offset.dot(direction);
         if !is_positive(along) {
             return Err(MeasureError::Behind);
         }
-        let across = offset - ray.direction * (along / ray.direction.norm_squared());
+        let across = offset - direction * (along / direction.norm_squared());
         distance_squared += across.norm_squared();
     }
     Ok(Triangulation {
-        point_mm: point,
+        point_mm: point.into(),
         gap_squared_mm2: 4.0 * distance_squared / count as f32,
     })
 }
@@ -187,7 +169,7 @@ const STEPS: usize = 2;
 fn start(
     count: usize,
     ray: &impl Fn(usize) -> Result<Ray, MeasureError>,
-) -> Result<Vector3<f32>, MeasureError> {
+) -> Result<Vector, MeasureError> {
     // Every ray must exist before any is judged.
     for k in 0..count {
         ray(k)?;
@@ -197,9 +179,10 @@ fn start(
         let mut widest: Option<(f32, Ray)> = None;
         for k in i + 1..count {
             let b = ray(k)?;
-            let normal_squared = a.direction.cross(&b.direction).norm_squared();
-            let sin_squared = normal_squared / b.direction.norm_squared();
-            if is_wide(normal_squared, &a.direction, &b.direction)
+            let [d1, d2] = [a.direction, b.direction].map(Vector::from);
+            let normal_squared = d1.cross(d2).norm_squared();
+            let sin_squared = normal_squared / d2.norm_squared();
+            if is_wide(normal_squared, d1, d2)
                 && widest.is_none_or(|(widest, _)| sin_squared > widest)
             {
                 widest = Some((sin_squared, b));
@@ -213,13 +196,14 @@ fn start(
 }
 
 /// Midpoint of two rays' common perpendicular, wherever it lies.
-fn nearest_of_pair(a: &Ray, b: &Ray) -> Vector3<f32> {
-    let w = b.origin_mm - a.origin_mm;
-    let normal = a.direction.cross(&b.direction);
+fn nearest_of_pair(a: &Ray, b: &Ray) -> Vector {
+    let [o1, d1, o2, d2] = [a.origin_mm, a.direction, b.origin_mm, b.direction].map(Vector::from);
+    let w = o2 - o1;
+    let normal = d1.cross(d2);
     let inverse = 1.0 / normal.norm_squared();
-    let lambda1 = w.cross(&b.direction).dot(&normal) * inverse;
-    let lambda2 = w.cross(&a.direction).dot(&normal) * inverse;
-    ((a.origin_mm + a.direction * lambda1) + (b.origin_mm + b.direction * lambda2)) * 0.5
+    let lambda1 = w.cross(d2).dot(normal) * inverse;
+    let lambda2 = w.cross(d1).dot(normal) * inverse;
+    ((o1 + d1 * lambda1) + (o2 + d2 * lambda2)) * 0.5
 }
 
 /// The step from `point` to the least-squares point.
@@ -230,17 +214,17 @@ fn nearest_of_pair(a: &Ray, b: &Ray) -> Vector3<f32> {
 fn step(
     count: usize,
     ray: &impl Fn(usize) -> Result<Ray, MeasureError>,
-    point: &Vector3<f32>,
-) -> Result<Vector3<f32>, MeasureError> {
-    let axes = axes_along(&ray(0)?.direction);
-    let in_axes = |a: &Vector3<f32>| Vector3::new(axes[0].dot(a), axes[1].dot(a), axes[2].dot(a));
+    point: Vector,
+) -> Result<Vector, MeasureError> {
+    let axes = axes_along(ray(0)?.direction.into());
+    let in_axes = |a: Vector| Vector::new(axes[0].dot(a), axes[1].dot(a), axes[2].dot(a));
     // Upper triangle of the sum of the projections across the rays, and of what they project.
     let [mut xx, mut xy, mut xz, mut yy, mut yz, mut zz] = [0.0; 6];
-    let mut right = Vector3::zeros();
+    let mut right = Vector::ZERO;
     for k in 0..count {
         let ray = ray(k)?;
-        let d = in_axes(&ray.direction);
-        let offset = in_axes(&(ray.origin_mm - point));
+        let d = in_axes(ray.direction.into());
+        let offset = in_axes(Vector::from(ray.origin_mm) - point);
         let inverse = 1.0 / d.norm_squared();
         xx += (d.y * d.y + d.z * d.z) * inverse;
         yy += (d.x * d.x + d.z * d.z) * inverse;
@@ -248,7 +232,7 @@ fn step(
         xy -= d.x * d.y * inverse;
         xz -= d.x * d.z * inverse;
         yz -= d.y * d.z * inverse;
-        right += d.cross(&offset.cross(&d)) * inverse;
+        right += d.cross(offset.cross(d)) * inverse;
     }
     // Cholesky without square roots. The first ray alone makes the first two pivots at least 1.
     let (l_yx, l_zx) = (xy / xx, xz / xx);
@@ -267,16 +251,16 @@ fn step(
 }
 
 /// Three unit vectors at right angles, the third along `direction`.
-fn axes_along(direction: &Vector3<f32>) -> [Vector3<f32>; 3] {
-    let unit = |a: Vector3<f32>| a * (1.0 / libm::sqrtf(a.norm_squared()));
-    let along = unit(*direction);
+fn axes_along(direction: Vector) -> [Vector; 3] {
+    let unit = |a: Vector| a * (1.0 / libm::sqrtf(a.norm_squared()));
+    let along = unit(direction);
     let least_parallel = if along.x * along.x < 0.5 {
-        Vector3::new(1.0, 0.0, 0.0)
+        Vector::new(1.0, 0.0, 0.0)
     } else {
-        Vector3::new(0.0, 1.0, 0.0)
+        Vector::new(0.0, 1.0, 0.0)
     };
-    let first = unit(along.cross(&least_parallel));
-    [first, along.cross(&first), along]
+    let first = unit(along.cross(least_parallel));
+    [first, along.cross(first), along]
 }
 
 #[cfg(test)]
@@ -285,8 +269,8 @@ mod tests {
 
     fn ray(origin: [f32; 3], direction: [f32; 3]) -> Ray {
         Ray {
-            origin_mm: origin.into(),
-            direction: direction.into(),
+            origin_mm: origin,
+            direction,
         }
     }
 
@@ -300,31 +284,33 @@ mod tests {
         let a = ray([0.0, 0.0, 0.0], [1.0, 0.0, 0.0]);
         let b = ray([1.0, -1.0, 2.0], [0.0, 3.0, 0.0]);
         let result = triangulate_pair(&a, &b).unwrap();
-        assert_eq!(result.point_mm, Vector3::new(1.0, 0.0, 1.0));
+        assert_eq!(result.point_mm, [1.0, 0.0, 1.0]);
         assert_eq!(result.gap_squared_mm2, 4.0);
         assert_eq!(result.gap_mm(), 2.0);
     }
 
     #[test]
     fn the_middle_moves_as_shifts_of_its_rays_say() {
-        let target = Vector3::new(10.0, -20.0, 300.0);
+        let target = Vector::new(10.0, -20.0, 300.0);
         let rays = [[0.0, 0.0, 0.0], [100.0, 15.0, 7.0]]
-            .map(|o| ray(o, (target - Vector3::from(o)).into()));
+            .map(|o| ray(o, (target - Vector::from(o)).into()));
         let meeting = meet(&rays[0], &rays[1]).unwrap();
         for axis in 0..3 {
-            let mut shift = Vector3::zeros();
+            let mut shift = [0.0; 3];
             shift[axis] = 1.0;
+            let shift = Vector::from(shift);
             let [by_a, _] = meeting.by_shifts_of_first(&rays[0], &rays[1], [shift; 2]);
             let [by_b, _] = meeting.by_shifts_of_second(&rays[0], &rays[1], [shift; 2]);
             for (shifted, by) in [(0, by_a), (1, by_b)] {
                 let mut moved = rays;
-                moved[shifted].origin_mm += shift;
-                let change = triangulate_pair(&moved[0], &moved[1]).unwrap().point_mm
-                    - meeting.found.point_mm;
+                let origin_mm = Vector::from(moved[shifted].origin_mm) + shift;
+                moved[shifted].origin_mm = origin_mm.into();
+                let point_mm = triangulate_pair(&moved[0], &moved[1]).unwrap().point_mm;
+                let change = Vector::from(point_mm) - meeting.found.point_mm.into();
                 // The point is linear in the shift; 300 mm have steps of 3e-5 mm.
                 assert!(
-                    (by - change).norm() < 3e-4,
-                    "{shifted} {axis}: {by} {change}"
+                    (by - change).norm_squared() < 9e-8,
+                    "{shifted} {axis}: {by:?} {change:?}"
                 );
             }
         }
@@ -348,17 +334,12 @@ mod tests {
 
     #[test]
     fn three_rays_through_one_point_meet_there() {
-        let target = Vector3::new(10.0, -20.0, 300.0);
-        let rays = [[0.0, 0.0, 0.0], [100.0, 0.0, 0.0], [0.0, 80.0, 5.0]].map(|o| {
-            let origin_mm = Vector3::from(o);
-            Ray {
-                origin_mm,
-                direction: target - origin_mm,
-            }
-        });
+        let target = Vector::new(10.0, -20.0, 300.0);
+        let rays = [[0.0, 0.0, 0.0], [100.0, 0.0, 0.0], [0.0, 80.0, 5.0]]
+            .map(|o| ray(o, (target - Vector::from(o)).into()));
         let result = many(&rays).unwrap();
         // 300 mm in f32: 3e-5 mm a digit.
-        assert!((result.point_mm - target).norm() < 1e-4);
+        assert!((Vector::from(result.point_mm) - target).norm_squared() < 1e-8);
         assert!(result.gap_mm() < 1e-4);
     }
 
@@ -368,7 +349,7 @@ mod tests {
         let a = ray([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]);
         let b = ray([-1.0, 0.0, 0.0], [1.8e-4, 0.0, 1.0]);
         let c = ray([1.0, 0.0, 0.0], [-1.8e-4, 0.0, 1.0]);
-        let point = many(&[a, b, c]).unwrap().point_mm;
-        assert!((point.z - 5555.6).abs() < 5.0, "{point}");
+        let [_, _, z] = many(&[a, b, c]).unwrap().point_mm;
+        assert!((z - 5555.6).abs() < 5.0, "{z}");
     }
 }

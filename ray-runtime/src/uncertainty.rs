@@ -12,16 +12,16 @@ use crate::format::{
 };
 use crate::match_noise::MatchNoise;
 use crate::triangulate::Triangulation;
-use nalgebra::{Matrix3, Vector3};
+use crate::vector::Vector;
 
-/// Covariance of a triangulated point, rig frame.
+/// Covariance of a triangulated point, rig frame; matrices are symmetric.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointCovariance {
     /// From what the calibration leaves uncertain, mm^2. The same for every measurement with the
     /// same pixels: no averaging makes it smaller.
-    pub calibration_mm2: Matrix3<f32>,
+    pub calibration_mm2: [[f32; 3]; 3],
     /// From the noise of the measured pixels, mm^2.
-    pub noise_mm2: Matrix3<f32>,
+    pub noise_mm2: [[f32; 3]; 3],
     /// Variance of the gap with its sign, from both together, mm^2. A gap whose square is often much more
     /// says that the rig is no longer the calibrated one, or that pixels are noisier than they were taken
     /// to be.
@@ -30,14 +30,22 @@ pub struct PointCovariance {
 
 impl PointCovariance {
     /// Both together, mm^2.
-    pub fn total_mm2(&self) -> Matrix3<f32> {
-        self.calibration_mm2 + self.noise_mm2
+    pub fn total_mm2(&self) -> [[f32; 3]; 3] {
+        let mut total = self.calibration_mm2;
+        for (sum, noise) in total
+            .as_flattened_mut()
+            .iter_mut()
+            .zip(self.noise_mm2.as_flattened())
+        {
+            *sum += noise;
+        }
+        total
     }
 
     /// Standard deviation along x, y and z of the rig frame, mm.
     pub fn sigma_mm(&self) -> [f32; 3] {
-        let total = self.total_mm2();
-        [total.m11, total.m22, total.m33].map(libm::sqrtf)
+        let [[xx, _, _], [_, yy, _], [_, _, zz]] = self.total_mm2();
+        [xx, yy, zz].map(libm::sqrtf)
     }
 }
 
@@ -145,13 +153,13 @@ impl<'a> Pair<'a> {
     pub fn covariance(
         &self,
         pixel: PixelPoint,
-        by_pixels: &[Vector3<f32>; 4],
+        by_pixels: &[Vector; 4],
         gap_by_pixels: [f32; 4],
         gap_scale: f32,
         noise: Option<MatchNoise>,
     ) -> Option<PointCovariance> {
         let [l11, l21, l22, l31, l32, l33, l41, l42, l43, l44] = self.factor_px(pixel)?;
-        let [a, b, c, d] = by_pixels;
+        let [a, b, c, d] = *by_pixels;
         let columns = [
             a * l11 + b * l21 + c * l31 + d * l41,
             b * l22 + c * l32 + d * l42,
@@ -176,7 +184,7 @@ impl<'a> Pair<'a> {
 }
 
 /// `sum of a a^T` times a factor: never negative along any direction, up to round-off.
-fn sum_of_squares(columns: &[Vector3<f32>; 4], factor: f32) -> Matrix3<f32> {
+fn sum_of_squares(columns: &[Vector; 4], factor: f32) -> [[f32; 3]; 3] {
     let [mut xx, mut xy, mut xz, mut yy, mut yz, mut zz] = [0.0; 6];
     for a in columns {
         xx += a.x * a.x;
@@ -186,7 +194,8 @@ fn sum_of_squares(columns: &[Vector3<f32>; 4], factor: f32) -> Matrix3<f32> {
         yz += a.y * a.z;
         zz += a.z * a.z;
     }
-    Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * factor
+    let [xx, xy, xz, yy, yz, zz] = [xx, xy, xz, yy, yz, zz].map(|sum| sum * factor);
+    [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
 }
 
 /// The node before a position and the share of the way to the next one, 0 to 1. A position that is
@@ -267,8 +276,8 @@ mod tests {
         // depends on their difference, and noise knows nothing of that.
         let node = [10, 3, 0, 0, 3, 0, 0, 0, 0, 0, 0];
         let nodes = [node; 4].concat_nodes();
-        let by_u = Vector3::new(2.0, 0.0, 0.0);
-        let zero = Vector3::zeros();
+        let by_u = Vector::new(2.0, 0.0, 0.0);
+        let zero = Vector::ZERO;
         let by_pixels = [by_u, zero, -by_u, zero];
         let pixel = PixelPoint::new(12.0, 18.0);
         let by_gap = [1.0, 2.0, -1.0, 2.0];
@@ -276,21 +285,21 @@ mod tests {
         let found = found.unwrap();
         // Noise: 10 of 0.25 px^2; of the calibration nothing but the first row's difference.
         assert_eq!(found.gap_mm2, 0.5 * 10.0 * 0.25);
-        assert_eq!(found.calibration_mm2, Matrix3::zeros());
+        assert_eq!(found.calibration_mm2, [[0.0; 3]; 3]);
         // 2 coordinates of 0.25 px^2, 2 mm/px each.
-        assert_eq!(found.noise_mm2.m11, 2.0);
+        assert_eq!(found.noise_mm2[0][0], 2.0);
         assert_eq!(found.sigma_mm(), [libm::sqrtf(2.0), 0.0, 0.0]);
         // Matches of twice the noise: four times its part, and the calibration's as before.
         let noise = MatchNoise::from_px(1.0);
         let noisy = pair(&nodes).covariance(pixel, &by_pixels, by_gap, 0.5, noise);
         let noisy = noisy.unwrap();
-        assert_eq!(noisy.noise_mm2, found.noise_mm2 * 4.0);
+        assert_eq!(noisy.noise_mm2[0][0], found.noise_mm2[0][0] * 4.0);
         assert_eq!(noisy.gap_mm2, found.gap_mm2 * 4.0);
         assert_eq!(noisy.calibration_mm2, found.calibration_mm2);
         let same = [by_u, zero, by_u, zero];
         let found = pair(&nodes).covariance(pixel, &same, [1.0, 0.0, 1.0, 0.0], 1.0, None);
         let found = found.unwrap();
-        assert!((found.calibration_mm2.m11 - 1.44).abs() < 1e-5);
+        assert!((found.calibration_mm2[0][0] - 1.44).abs() < 1e-5);
         // Twice 0.3 px together, and twice 0.25 px^2.
         assert!((found.gap_mm2 - 0.86).abs() < 1e-5);
     }

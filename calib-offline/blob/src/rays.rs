@@ -65,8 +65,8 @@ impl RaySource for RayBlob<'_> {
                 name: camera.name.to_owned(),
                 sensor: SensorSize::new(camera.sensor_width, camera.sensor_height),
                 rig_from_camera: RigidTransform::new(
-                    camera.rig_from_camera.rotation.cast(),
-                    camera.rig_from_camera.translation_mm.cast(),
+                    camera.rig_from_camera.rotation_matrix().matrix().cast(),
+                    camera.rig_from_camera.translation_mm.map(f64::from).into(),
                 ),
             })
             .collect()
@@ -76,8 +76,8 @@ impl RaySource for RayBlob<'_> {
         let pixel = ray_runtime::PixelPoint::new(pixel.u as f32, pixel.v as f32);
         let ray = self.lookup(camera_idx, pixel).ok()?;
         Some(with_unit_direction(Ray {
-            origin_mm: ray.origin_mm.cast(),
-            direction: ray.direction.cast(),
+            origin_mm: ray.origin_mm.map(f64::from).into(),
+            direction: ray.direction.map(f64::from).into(),
         }))
     }
 }

@@ -331,7 +331,7 @@ fn blob_object(blob: &RayBlob<'_>) -> BlobObject {
                 cells: camera.cells,
                 form: form_name(camera.encoding.form),
                 central: camera.encoding.is_central,
-                position_mm: camera.rig_from_camera.translation_mm.into(),
+                position_mm: camera.rig_from_camera.translation_mm,
             })
             .collect(),
         pairs: blob

@@ -47,8 +47,9 @@ fn write_matches(path: &Path, moved_px: f32) -> usize {
         let Ok(ray) = blob.lookup(0, pixel) else {
             continue;
         };
-        let point_mm = ray.origin_mm + ray.direction * (200.0 + f32::from(k % 7) * 50.0);
-        if let Ok(seen) = blob.project(1, &point_mm) {
+        let along = 200.0 + f32::from(k % 7) * 50.0;
+        let point_mm = [0, 1, 2].map(|axis| ray.origin_mm[axis] + ray.direction[axis] * along);
+        if let Ok(seen) = blob.project(1, point_mm) {
             let [u, v] = [seen.u, seen.v + moved_px];
             let _ = writeln!(text, "{k},{},{},{u},{v}", pixel.u, pixel.v);
             count += 1;

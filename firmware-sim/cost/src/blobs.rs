@@ -184,7 +184,7 @@ fn table_nodes(blob: &RayBlob<'_>, number: usize, camera: &Camera<'_>) -> Vec<[f
         first as f32 - 0.5 + count as f32 * k as f32 / (nodes - 1) as f32
     };
     let region = camera.region;
-    let z_mm = camera.rig_from_camera.translation_mm.z;
+    let [_, _, z_mm] = camera.rig_from_camera.translation_mm;
     let node = |index: usize| {
         let pixel = PixelPoint::new(
             at(region.u, region.width, index % nodes_u, nodes_u),
@@ -197,16 +197,16 @@ fn table_nodes(blob: &RayBlob<'_>, number: usize, camera: &Camera<'_>) -> Vec<[f
 }
 
 fn in_two_planes(ray: &Ray, z_mm: f32) -> [f32; 4] {
-    let (origin, direction) = (ray.origin_mm, ray.direction);
-    if !(direction.z > 0.0) {
+    let ([x, y, z], [dx, dy, dz]) = (ray.origin_mm, ray.direction);
+    if !(dz > 0.0) {
         return [0.0; 4];
     }
-    let slopes = [direction.x / direction.z, direction.y / direction.z];
+    let slopes = [dx / dz, dy / dz];
     [
         slopes[0],
         slopes[1],
-        origin.x + (z_mm - origin.z) * slopes[0],
-        origin.y + (z_mm - origin.z) * slopes[1],
+        x + (z_mm - z) * slopes[0],
+        y + (z_mm - z) * slopes[1],
     ]
 }
 
@@ -220,7 +220,7 @@ fn table<'a>(camera: &Camera<'_>, values: &'a [[f32; 4]]) -> BilinearTable<'a> {
             per_px(TABLE_NODES[0], region.width),
             per_px(TABLE_NODES[1], region.height),
         ],
-        z_mm: camera.rig_from_camera.translation_mm.z,
+        z_mm: camera.rig_from_camera.translation_mm[2],
         values,
     }
 }
@@ -236,8 +236,12 @@ fn brown(blob: &RayBlob<'_>, number: usize, camera: &Camera<'_>) -> Brown {
     let pose = camera.rig_from_camera;
     let slope_at = |u: f32| {
         let ray = blob.lookup(number, PixelPoint::new(u, center.v)).ok()?;
-        let direction = pose.rotation.transpose() * ray.direction;
-        (direction.z > 0.0).then(|| direction.x / direction.z)
+        let [dx, dy, dz] = ray.direction;
+        let along = |axis: usize| {
+            let [x, y, z] = pose.rotation.map(|row| row[axis]);
+            x * dx + y * dy + z * dz
+        };
+        (along(2) > 0.0).then(|| along(0) / along(2))
     };
     let step_px = 0.125 * region.width as f32;
     let inverse_focal = slope_at(center.u - step_px)
@@ -245,15 +249,13 @@ fn brown(blob: &RayBlob<'_>, number: usize, camera: &Camera<'_>) -> Brown {
         .map(|(low, high)| (high - low) / (2.0 * step_px))
         .filter(|inverse| inverse.is_normal())
         .unwrap_or(1.0 / region.width as f32);
-    let r = pose.rotation;
+    let [[r11, r12, r13], [r21, r22, r23], [r31, r32, r33]] = pose.rotation;
     Brown {
         inverse_focal: [inverse_focal; 2],
         center_px: [center.u, center.v],
         k: [-0.05, 0.004, -0.0003],
         p: [2e-4, -1e-4],
-        rotation: [
-            r.m11, r.m12, r.m13, r.m21, r.m22, r.m23, r.m31, r.m32, r.m33,
-        ],
-        center_mm: pose.translation_mm.into(),
+        rotation: [r11, r12, r13, r21, r22, r23, r31, r32, r33],
+        center_mm: pose.translation_mm,
     }
 }

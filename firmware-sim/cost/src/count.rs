@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use crate::blobs::{Asked, MATCH_COUNT};
-use crate::counting::{KNOWN_INSTRUCTIONS, Probe, RECORD_LEN, Record};
+use crate::counting::{KNOWN_INSTRUCTIONS, Probe, RECORD_LEN, ROW_LEN, Record};
 use crate::error::CostError;
 use crate::image::Image;
 use crate::images::Images;
@@ -50,6 +50,7 @@ pub fn cost_of_blob(
         let is_asked = match work.probe {
             Probe::Covariance => asked.has_uncertainty,
             Probe::LookupSecond
+            | Probe::RowSecond
             | Probe::Triangulate
             | Probe::BilinearTriangulate
             | Probe::BrownTriangulate => asked.cameras.len() > 1,
@@ -62,14 +63,14 @@ pub fn cost_of_blob(
             .filter(|record| record.answered != 0)
             .collect();
         let failed = of(work.probe).count() - answered.len();
-        if failed > 0 && !work.is_yardstick {
+        if failed > 0 && !(work.is_yardstick || work.is_row) {
             return Err(CostError::NoResult {
                 path: path.to_owned(),
                 what: work.name,
                 failed,
             });
         }
-        let Some(spread) = Spread::of(answered.iter().map(|r| instructions(r) - overhead)) else {
+        let Some(spread) = Spread::of(answered.iter().map(|record| work.each(instructions(record) - overhead))) else {
             continue;
         };
         let camera = work.camera.and_then(|k| asked.cameras.get(k));
@@ -152,14 +153,18 @@ struct Work {
     /// Which of the two, for work on one.
     camera: Option<usize>,
     is_yardstick: bool,
+    /// Whether it is done for a row of pixels at once; rows that are not wholly calibrated are left out.
+    is_row: bool,
 }
 
 /// The rows of the table, in its order.
-const WORK: [Work; 10] = [
+const WORK: [Work; 12] = [
     Work::of_blob(Probe::Open, "open"),
     Work::of_blob(Probe::Checksum, "checksum"),
     Work::lookup(Probe::LookupFirst, "lookup_first", 0),
     Work::lookup(Probe::LookupSecond, "lookup_second", 1),
+    Work::row(Probe::RowFirst, "row_first", 0),
+    Work::row(Probe::RowSecond, "row_second", 1),
     Work::of_blob(Probe::Triangulate, "triangulate"),
     Work::of_blob(Probe::Covariance, "triangulate_with_covariance"),
     Work::yardstick(Probe::BilinearLookup, "bilinear_lookup"),
@@ -176,6 +181,7 @@ impl Work {
             function: name,
             camera: None,
             is_yardstick: false,
+            is_row: false,
         }
     }
 
@@ -185,6 +191,20 @@ impl Work {
             camera: Some(camera),
             ..Self::of_blob(probe, "lookup")
         }
+    }
+
+    const fn row(probe: Probe, function: &'static str, camera: usize) -> Self {
+        Self {
+            name: "a ray in a row of 64",
+            is_row: true,
+            ..Self::lookup(probe, function, camera)
+        }
+    }
+
+    /// What one of them takes, rounded up.
+    fn each(&self, instructions: i64) -> i64 {
+        let length = if self.is_row { ROW_LEN as i64 } else { 1 };
+        (instructions + length - 1) / length
     }
 
     const fn yardstick(probe: Probe, name: &'static str) -> Self {

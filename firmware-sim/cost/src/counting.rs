@@ -39,14 +39,21 @@ pub enum Probe {
     BrownUndistortion,
     /// Yardstick: two cameras of Brown's model, and the runtime's midpoint.
     BrownTriangulate,
+    /// `RayBlob::lookup_row` of [`ROW_LEN`] pixels, the one of the match among them, in the first camera.
+    RowFirst,
+    /// The same in the second camera.
+    RowSecond,
 }
+
+/// Pixels of a row.
+pub const ROW_LEN: usize = 64;
 
 /// What [`Probe::Known`] runs.
 pub const KNOWN_INSTRUCTIONS: u32 = 100;
 
 impl Probe {
     /// All of them.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 14] = [
         Self::Nothing,
         Self::Known,
         Self::Open,
@@ -59,6 +66,8 @@ impl Probe {
         Self::BilinearTriangulate,
         Self::BrownUndistortion,
         Self::BrownTriangulate,
+        Self::RowFirst,
+        Self::RowSecond,
     ];
 
     /// Whether it depends on the pixels, and is run for every match. The others are run once.

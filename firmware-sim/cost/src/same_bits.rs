@@ -49,7 +49,7 @@ pub fn digest_of_integers(blob: &RayBlob<'_>, count: u32) -> Option<Digest> {
         match integers.triangulate((0, a), (1, b)) {
             Ok(found) => {
                 digest.points += 1;
-                let [x, y, z]: [f32; 3] = found.point_mm.into();
+                let [x, y, z] = found.point_mm;
                 for number in [x, y, z, found.gap_squared_mm2] {
                     digest.add(number.to_bits());
                 }
@@ -84,7 +84,7 @@ impl Digest {
     }
 
     fn add_projection(&mut self, blob: &RayBlob<'_>, measured: &Measurement) {
-        let words = match blob.project(1, &measured.found.point_mm) {
+        let words = match blob.project(1, measured.found.point_mm) {
             Ok(pixel) => [pixel.u, pixel.v].map(f32::to_bits),
             Err(error) => [u32::from(error.code()); 2],
         };
@@ -96,8 +96,7 @@ impl Digest {
     fn add_point(&mut self, measured: &Measurement) {
         self.points += 1;
         let found = &measured.found;
-        let point: [f32; 3] = found.point_mm.into();
-        for x in point {
+        for x in found.point_mm {
             self.add(x.to_bits());
         }
         self.add(found.gap_squared_mm2.to_bits());

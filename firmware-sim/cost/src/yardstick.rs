@@ -59,8 +59,8 @@ impl BilinearTable<'_> {
     pub fn ray(&self, pixel: PixelPoint) -> Option<Ray> {
         let [slope_x, slope_y, x_mm, y_mm] = self.at(pixel)?;
         Some(Ray {
-            origin_mm: [x_mm, y_mm, self.z_mm].into(),
-            direction: [slope_x, slope_y, 1.0].into(),
+            origin_mm: [x_mm, y_mm, self.z_mm],
+            direction: [slope_x, slope_y, 1.0],
         })
     }
 }
@@ -112,13 +112,12 @@ impl Brown {
         let [x, y] = self.undistorted(pixel);
         let r = &self.rotation;
         Ray {
-            origin_mm: self.center_mm.into(),
+            origin_mm: self.center_mm,
             direction: [
                 r[0] * x + r[1] * y + r[2],
                 r[3] * x + r[4] * y + r[5],
                 r[6] * x + r[7] * y + r[8],
-            ]
-            .into(),
+            ],
         }
     }
 }

@@ -121,7 +121,8 @@ enum Ask {
 
 /// The device, until nobody can ask it any more.
 fn run(mut flash: SimFlash, trust: Trust, arithmetic: Arithmetic, asked: &Receiver<Ask>) {
-    let mut device = Device::new("firmware-sim host", HostClock(Instant::now())).taking(trust);
+    let clock = HostClock(Instant::now());
+    let mut device = Device::new("firmware-sim host", clock).taking(trust);
     if arithmetic == Arithmetic::Integer {
         device = device.computing_in_integers();
     }

@@ -77,8 +77,8 @@ fn a_device_measures_in_integers_and_says_so() {
             let here = rig.triangulate(pixel(asked.first), pixel(asked.second));
             match (found[k].outcome, here) {
                 (Ok(there), Ok(here)) => {
-                    let here: [f32; 3] = here.point_mm.into();
-                    assert_eq!(there.point_mm.map(f32::to_bits), here.map(f32::to_bits));
+                    let here = here.point_mm.map(f32::to_bits);
+                    assert_eq!(there.point_mm.map(f32::to_bits), here);
                     assert_eq!(there.sigma_mm, None);
                     count += 1;
                 }

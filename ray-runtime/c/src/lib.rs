@@ -13,7 +13,6 @@ mod types;
 
 use core::ffi::c_int;
 use core::mem::MaybeUninit;
-use nalgebra::Vector3;
 use ray_runtime::{
     MatchNoise, MeasureError, OpenError, PixelPoint, ProjectError, RayBlob, Readout, SensorWindow,
 };
@@ -147,8 +146,8 @@ pub unsafe extern "C" fn rays_lookup(rig: *const Rig, sighting: Sighting, ray: *
     let ask = |blob: &RayBlob<'_>| {
         let found = blob.lookup(sighting.camera, sighting.pixel());
         found.map_err(|error| error.code()).map(|found| Ray {
-            origin_mm: found.origin_mm.into(),
-            direction: found.direction.into(),
+            origin_mm: found.origin_mm,
+            direction: found.direction,
         })
     };
     // SAFETY: both are null or what they should be, says the caller.
@@ -169,7 +168,7 @@ pub unsafe extern "C" fn rays_triangulate(
     let ask = |blob: &RayBlob<'_>| {
         let found = blob.triangulate(first.of_rust(), second.of_rust());
         found.map_err(MeasureError::code).map(|found| Point {
-            point_mm: found.point_mm.into(),
+            point_mm: found.point_mm,
             gap_squared_mm2: found.gap_squared_mm2,
         })
     };
@@ -307,7 +306,7 @@ pub unsafe extern "C" fn rays_epipolar_curve(
         for (place, point) in points.iter_mut().zip(curve) {
             place.write(CurvePoint {
                 pixel: point.pixel.into(),
-                point_mm: point.point_mm.into(),
+                point_mm: point.point_mm,
             });
             number += 1;
         }
@@ -423,14 +422,14 @@ unsafe fn project(
     rig: *const Rig,
     point_mm: *const [f32; 3],
     pixel: *mut Pixel,
-    ask: impl FnOnce(&RayBlob<'_>, &Vector3<f32>) -> Result<PixelPoint, ProjectError>,
+    ask: impl FnOnce(&RayBlob<'_>, [f32; 3]) -> Result<PixelPoint, ProjectError>,
 ) -> c_int {
     // SAFETY: null or three numbers, says the caller.
     let Some(point_mm) = (unsafe { point_mm.as_ref() }) else {
         return BAD_ARGUMENT;
     };
     let ask = |blob: &RayBlob<'_>| {
-        let found = ask(blob, &Vector3::from(*point_mm));
+        let found = ask(blob, *point_mm);
         found.map(Pixel::from).map_err(ProjectError::code)
     };
     // SAFETY: the caller's word.

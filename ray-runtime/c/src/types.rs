@@ -73,7 +73,7 @@ impl Measurement {
     pub(crate) fn of_rust(measured: ray_runtime::Measurement) -> Self {
         let sigma_mm = measured.covariance.map(|covariance| covariance.sigma_mm());
         Self {
-            point_mm: measured.found.point_mm.into(),
+            point_mm: measured.found.point_mm,
             gap_squared_mm2: measured.found.gap_squared_mm2,
             sigma_mm: sigma_mm.unwrap_or_default(),
             has_sigma: sigma_mm.is_some().into(),

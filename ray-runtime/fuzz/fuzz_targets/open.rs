@@ -6,7 +6,6 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use nalgebra::Vector3;
 use ray_runtime::format::{CRC_OFFSET, Form, checksum};
 use ray_runtime::{
     Camera, MatchNoise, PixelPoint, PointCovariance, RayBlob, Readout, SensorWindow,
@@ -104,8 +103,8 @@ fn ask_everything(blob: &RayBlob<'_>) {
         if let (Ok(point), Ok(measured)) = (point, measured) {
             let bits = |x: [f32; 3]| x.map(f32::to_bits);
             assert_eq!(
-                bits(point.point_mm.into()),
-                bits(measured.found.point_mm.into())
+                bits(point.point_mm),
+                bits(measured.found.point_mm)
             );
             let _ = measured.covariance.map(|covariance| covariance.sigma_mm());
             // What a request says of the noise in place of the blob: the same bits if it says the same.
@@ -120,7 +119,7 @@ fn ask_everything(blob: &RayBlob<'_>) {
             let _ = blob.triangulate_with_noise(a, b, MatchNoise::NONE);
             // Twice at most: a projection costs as much as a hundred points.
             if k % 32 == 0 {
-                ask_back(blob, a, b.0, &point.point_mm);
+                ask_back(blob, a, b.0, point.point_mm);
             }
         }
     }
@@ -131,7 +130,7 @@ fn ask_everything(blob: &RayBlob<'_>) {
 }
 
 /// Where another camera sees a point, and a pixel's ray.
-fn ask_back(blob: &RayBlob<'_>, seen: (usize, PixelPoint), other: usize, point_mm: &Vector3<f32>) {
+fn ask_back(blob: &RayBlob<'_>, seen: (usize, PixelPoint), other: usize, point_mm: [f32; 3]) {
     if let Ok(pixel) = blob.project(other, point_mm) {
         assert!(blob.is_calibrated(other, pixel));
         // One step from where the last one was too short to matter: found or lost, but no panic.

@@ -239,15 +239,13 @@ pub fn noise(px: f32) -> PyResult<MatchNoise> {
 
 fn facts(camera: &Camera<'_>) -> CameraFacts {
     let region = camera.region;
-    let [r1, r2, r3] = [0, 1, 2].map(|k| camera.rig_from_camera.rotation.row(k).into_owned());
+    let [[r11, r12, r13], [r21, r22, r23], [r31, r32, r33]] = camera.rig_from_camera.rotation;
     (
         camera.name.to_owned(),
         [camera.sensor_width, camera.sensor_height],
         [region.u, region.v, region.width, region.height],
-        [
-            r1[0], r1[1], r1[2], r2[0], r2[1], r2[2], r3[0], r3[1], r3[2],
-        ],
-        camera.rig_from_camera.translation_mm.into(),
+        [r11, r12, r13, r21, r22, r23, r31, r32, r33],
+        camera.rig_from_camera.translation_mm,
         camera.encoding.is_central,
     )
 }

@@ -1,7 +1,6 @@
 //! One question after the other, the answers into vectors: no Python in here.
 
 use crate::arrays::{Coordinate, Rows};
-use nalgebra::{Matrix3, Vector3};
 use ray_runtime::{
     LookupError, MatchNoise, MeasureError, Measurement, PixelPoint, Ray, RayBlob, Triangulation,
 };
@@ -58,7 +57,7 @@ impl Rays {
         for at in pixels {
             let ray: Result<Ray, LookupError> = blob.lookup(camera, pixel(*at));
             let (origin, direction, status) = match ray {
-                Ok(ray) => (ray.origin_mm.into(), ray.direction.into(), OK),
+                Ok(ray) => (ray.origin_mm, ray.direction, OK),
                 Err(_) => ([f32::NAN; 3], [f32::NAN; 3], OUTSIDE),
             };
             self.origins_mm.extend_from_slice(&origin);
@@ -162,7 +161,7 @@ impl Points {
     #[inline(always)]
     fn add(&mut self, found: &Result<Triangulation, MeasureError>) {
         let (xyz_mm, gap_mm, status) = match found {
-            Ok(found) => (found.point_mm.into(), found.gap_mm(), OK),
+            Ok(found) => (found.point_mm, found.gap_mm(), OK),
             Err(error) => ([f32::NAN; 3], f32::NAN, status(*error)),
         };
         self.xyz_mm.extend_from_slice(&xyz_mm);
@@ -176,9 +175,8 @@ impl Points {
         let sigma_mm = known.map_or([f32::NAN; 3], |known| known.sigma_mm());
         self.sigma_mm.extend_from_slice(&sigma_mm);
         if depth == Depth::Covariance {
-            // Symmetric: rows or columns first is the same.
-            let total = known.map_or(Matrix3::from_element(f32::NAN), |known| known.total_mm2());
-            self.covariance_mm2.extend_from_slice(total.as_slice());
+            let total = known.map_or([[f32::NAN; 3]; 3], |known| known.total_mm2());
+            self.covariance_mm2.extend_from_slice(total.as_flattened());
         }
     }
 }
@@ -216,9 +214,9 @@ fn of_points<T: Coordinate>(
     let mut found = Vec::with_capacity(2 * points_mm.len());
     let mut last: Option<PixelPoint> = None;
     for (k, point_mm) in points_mm.iter().enumerate() {
-        let point_mm: Vector3<f32> = point_mm.map(T::narrow).into();
-        let anywhere = || blob.project(camera, &point_mm).ok();
-        let near = |start| blob.project_near(camera, &point_mm, start).ok();
+        let point_mm = point_mm.map(T::narrow);
+        let anywhere = || blob.project(camera, point_mm).ok();
+        let near = |start| blob.project_near(camera, point_mm, start).ok();
         let seen = match search {
             Search::Anywhere => anywhere(),
             Search::FromLast => last.and_then(near).or_else(anywhere),

@@ -1,7 +1,5 @@
 //! The forms in which a camera's field can be stored.
 
-use super::header::OLDEST_VERSION;
-
 /// How a camera's table is stored. Every form gives, for a pixel, the half-angle vector of its ray
 /// and, if the camera is not central, the scaled offset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,9 +48,14 @@ impl Encoding {
         if self.is_central { first } else { first + 1 }
     }
 
-    /// Whether this library reads it: the form of old versions needs the feature `old-versions`.
+    /// Whether this library was built to read it: each form needs a feature, `patches`, `quantized`, or
+    /// `old-versions` for splines.
     pub const fn is_read(self) -> bool {
-        OLDEST_VERSION < 3 || !matches!(self.form, Form::Spline)
+        match self.form {
+            Form::Spline => cfg!(feature = "old-versions"),
+            Form::Patches => cfg!(feature = "patches"),
+            Form::Quantized => cfg!(feature = "quantized"),
+        }
     }
 
     /// The lowest format version that has it.

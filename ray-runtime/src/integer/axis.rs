@@ -197,14 +197,13 @@ mod tests {
                 );
                 let exact = (f64::from(pixel) + 0.5) / f64::from(extent);
                 assert!((f64::from(place.0) / 2.0f64.powi(31) - exact).abs() < 1e-8);
-                let share = f64::from(axis.cell_and_share(place).1) / 2.0f64.powi(30);
-                let cell = numbers.cell_and_share(pixel as f32 + first as f32, cells);
-                assert_eq!(axis.cell_and_share(place).0 as usize, cell.0);
-                assert!(
-                    (share - f64::from(cell.1)).abs() < 2e-4,
-                    "{share} {}",
-                    cell.1
-                );
+                let (cell, share) = axis.cell_and_share(place);
+                assert_eq!(cell, (2 * pixel + 1) * cells / (2 * extent));
+                // As f32 has it: from where `cell_high_px` has the cell's first edge.
+                let start = f64::from(cell) * f64::from(numbers.cell_high_px);
+                let exact = (f64::from(pixel) + 0.5 - start) * f64::from(numbers.cells_per_px);
+                let share = f64::from(share) / 2.0f64.powi(30);
+                assert!((share - exact).abs() < 2e-6, "{share} {exact}");
             }
             let end = edge + ((extent - 1) << 16).cast_signed() + 65_535;
             let last = axis.place(end.wrapping_add(1)).unwrap();

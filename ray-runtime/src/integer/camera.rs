@@ -8,10 +8,10 @@ use super::product::product;
 use super::ray::{FixedPixel, Pose, Sample, ray};
 use super::spline;
 use crate::format::{
-    ALIGNMENT, Encoding, Form, OLDEST_VERSION, QUANTIZED_HEADER_PAIRS, QuantizedHeader,
+    ALIGNMENT, Encoding, Form, QUANTIZED_HEADER_PAIRS, QuantizedHeader,
     QuantizedMap, Record, coefficient_count, knots_len,
 };
-use crate::lookup::Views;
+use crate::lookup::{HAS_PATCHES, HAS_QUANTIZED, HAS_SPLINES, Views};
 
 /// Binary digits of half-angle vectors behind the point.
 const S_DIGITS: Digits = Digits::new(28);
@@ -140,10 +140,12 @@ impl<'a> Camera<'a> {
             return None;
         }
         let sample = match &self.table {
-            Table::Patches => self.patch(u, v)?,
-            Table::Usual(table) => self.usual(table, u, v)?,
-            Table::Spline => self.spline(u, v)?,
-            Table::Quantized(header) => self.quantized(header, u, v)?,
+            Table::Patches if HAS_PATCHES => self.patch(u, v)?,
+            Table::Usual(table) if HAS_QUANTIZED => self.usual(table, u, v)?,
+            Table::Quantized(header) if HAS_QUANTIZED => self.quantized(header, u, v)?,
+            Table::Spline if HAS_SPLINES => self.spline(u, v)?,
+            // No blob with another form is opened.
+            _ => return None,
         };
         ray(&self.pose, sample, self.is_central)
     }
@@ -233,12 +235,8 @@ impl<'a> Camera<'a> {
         })
     }
 
-    /// Never, so that nothing of it is linked, where blobs of old versions are not read.
     #[inline(never)]
     fn spline(&self, u: Place, v: Place) -> Option<Sample> {
-        if OLDEST_VERSION >= 3 {
-            return None;
-        }
         let [axis_u, axis_v] = &self.axes;
         let places = (axis_u.cell_and_fraction(u), axis_v.cell_and_fraction(v));
         let window = spline::Window::at(self.axes[0].cells(), places.0, places.1);

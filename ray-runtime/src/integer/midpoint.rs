@@ -25,7 +25,7 @@ impl FixedPoint {
     /// The point in f32, each number rounded once.
     pub fn to_triangulation(&self) -> Triangulation {
         Triangulation {
-            point_mm: self.point.map(|x| to_f32(x, self.exponent)).into(),
+            point_mm: self.point.map(|x| to_f32(x, self.exponent)),
             gap_squared_mm2: unsigned_to_f32(self.gap_squared, self.gap_squared_exponent),
         }
     }

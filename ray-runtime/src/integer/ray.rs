@@ -28,8 +28,8 @@ impl FixedRay {
     /// The ray in f32, each number rounded once.
     pub fn to_ray(&self) -> Ray {
         Ray {
-            origin_mm: self.origin.map(|x| to_f32(x, self.exponent)).into(),
-            direction: self.direction.map(|x| to_f32(x, -28)).into(),
+            origin_mm: self.origin.map(|x| to_f32(x, self.exponent)),
+            direction: self.direction.map(|x| to_f32(x, -28)),
         }
     }
 }

@@ -27,8 +27,7 @@ impl<const N: usize> Rig<'_, N> {
                 camera, pixel: at, ..
             } => {
                 let ray = self.lookup(camera.into(), pixel(at)).ok()?;
-                let ([a, b, c], [d, e, f]): ([f32; 3], [f32; 3]) =
-                    (ray.origin_mm.into(), ray.direction.into());
+                let ([a, b, c], [d, e, f]) = (ray.origin_mm, ray.direction);
                 [a, b, c, d, e, f]
             }
             SelfTest::Pair {
@@ -39,7 +38,7 @@ impl<const N: usize> Rig<'_, N> {
                 let found = self
                     .triangulate((a.into(), pixel(at_a)), (b.into(), pixel(at_b)))
                     .ok()?;
-                let [x, y, z]: [f32; 3] = found.point_mm.into();
+                let [x, y, z] = found.point_mm;
                 [x, y, z, found.gap_squared_mm2, 0.0, 0.0]
             }
             SelfTest::Sigma { .. } => [0.0; 6],

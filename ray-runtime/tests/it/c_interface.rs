@@ -168,11 +168,11 @@ fn expected_search(
     let seen = |pixel: Result<PixelPoint, ProjectError>| {
         field(pixel.map(of_pixel).map_err(ProjectError::code))
     };
-    let pixel = blob.project(1, &point.point_mm);
+    let pixel = blob.project(1, point.point_mm);
     let mut text = seen(pixel);
     if let Ok(pixel) = pixel {
         let start = PixelPoint::new(pixel.u + 2.5, pixel.v);
-        text += &seen(blob.project_near(1, &point.point_mm, start));
+        text += &seen(blob.project_near(1, point.point_mm, start));
     }
     let of_curve = |curve: EpipolarCurve<'_>| {
         curve

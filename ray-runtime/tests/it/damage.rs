@@ -495,7 +495,7 @@ fn random_damage_never_panics(form: Form) {
         let _ = blob.triangulate_many(&[(0, pixel), (1, pixel), (0, PixelPoint::new(1.0, 1.0))]);
         let _ = blob.run_self_tests();
         for camera in 0..2 {
-            let _ = blob.project(camera, &nalgebra::Vector3::new(1.0, 2.0, 300.0));
+            let _ = blob.project(camera, [1.0, 2.0, 300.0]);
         }
         let _ = blob
             .epipolar_curve((0, pixel), 1, [100.0, 500.0], 3)

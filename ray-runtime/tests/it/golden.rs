@@ -77,7 +77,7 @@ fn metadata_says_what_was_packed() {
 fn answers_keep_their_bits() {
     let blob = RayBlob::open(&GOLDEN.0).unwrap();
     assert_eq!(blob.run_self_tests(), Ok(8));
-    let bits = |v: nalgebra::Vector3<f32>| [v.x, v.y, v.z].map(f32::to_bits);
+    let bits = |v: [f32; 3]| v.map(f32::to_bits);
     let right = blob.lookup(1, PixelPoint::new(10.25, 40.5)).unwrap();
     assert_eq!(bits(right.origin_mm), RIGHT_ORIGIN);
     assert_eq!(bits(right.direction), RIGHT_DIRECTION);

@@ -34,8 +34,7 @@ fn norm(v: [f32; 3]) -> f64 {
     v.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt()
 }
 
-fn between(a: impl Into<[f32; 3]>, b: impl Into<[f32; 3]>) -> f64 {
-    let (a, b) = (a.into(), b.into());
+fn between(a: [f32; 3], b: [f32; 3]) -> f64 {
     norm([0, 1, 2].map(|k| a[k] - b[k]))
 }
 
@@ -88,11 +87,9 @@ fn points_are_those_of_f32_and_so_are_refusals() {
             let first = PixelPoint::new(random.between(-2.0, 65.0), random.between(-2.0, 49.0));
             let depth = random.between(50.0, 3000.0);
             let second = blob.lookup(0, first).ok().and_then(|ray| {
-                let (origin, direction): ([f32; 3], [f32; 3]) =
-                    (ray.origin_mm.into(), ray.direction.into());
-                let seen = [0, 1, 2].map(|k| origin[k] + direction[k] * depth);
+                let seen = [0, 1, 2].map(|k| ray.origin_mm[k] + ray.direction[k] * depth);
                 let start = PixelPoint::new(32.0, 24.0);
-                blob.project_near(1, &seen.into(), start).ok()
+                blob.project_near(1, &seen, start).ok()
             });
             let second = second.unwrap_or(PixelPoint::new(10.0, 10.0));
             let second = PixelPoint::new(
@@ -114,7 +111,7 @@ fn points_are_those_of_f32_and_so_are_refusals() {
             };
             count += 1;
             // A point moves by some 5 mm a pixel at half a meter, and with the square of its distance.
-            let distance_mm = norm(exact.point_mm.into()).max(500.0);
+            let distance_mm = norm(exact.point_mm).max(500.0);
             let allowed_mm = 0.04 * (distance_mm / 500.0).powi(2);
             let off_mm = between(found.point_mm, exact.point_mm);
             assert!(off_mm < allowed_mm, "{name}: {off_mm} at {distance_mm}");

@@ -9,6 +9,7 @@ mod golden;
 mod integer;
 mod project;
 mod questions;
+mod rows;
 mod sections;
 mod test_blob;
 mod uncertainty;

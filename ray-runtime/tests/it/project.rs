@@ -4,7 +4,7 @@ use crate::test_blob::{TestBlob, TestCamera, encoding};
 use nalgebra::Vector3;
 use ray_runtime::format::Form;
 use ray_runtime::{
-    MeasureError, PixelPoint, ProjectError, RayBlob, Readout, ReadoutError, SensorWindow,
+    MeasureError, PixelPoint, ProjectError, Ray, RayBlob, Readout, ReadoutError, SensorWindow,
 };
 use split_mix::SplitMix;
 
@@ -30,6 +30,11 @@ fn each_form(check: fn(&RayBlob<'_>)) {
     }
 }
 
+/// The point of a ray at a multiple of its direction.
+fn at(ray: &Ray, lambda: f32) -> [f32; 3] {
+    (Vector3::from(ray.origin_mm) + Vector3::from(ray.direction) * lambda).into()
+}
+
 fn distance_px(a: PixelPoint, b: PixelPoint) -> f32 {
     (a.u - b.u).hypot(a.v - b.v)
 }
@@ -45,12 +50,12 @@ fn a_point_on_a_pixels_ray_is_projected_to_that_pixel() {
             let Ok(ray) = blob.lookup(camera, pixel) else {
                 continue;
             };
-            let point = ray.origin_mm + ray.direction * random.between(100.0, 1000.0);
-            let again = blob.project(camera, &point).unwrap();
+            let point = at(&ray, random.between(100.0, 1000.0));
+            let again = blob.project(camera, point).unwrap();
             // A pixel is 2 mm at 100 mm; points of 1000 mm have steps of 6e-5 mm.
             assert!(distance_px(again, pixel) < 1e-4, "{pixel:?} {again:?}");
             let start = PixelPoint::new(pixel.u + 3.0, pixel.v - 2.0);
-            let near = blob.project_near(camera, &point, start).unwrap();
+            let near = blob.project_near(camera, point, start).unwrap();
             assert!(distance_px(near, pixel) < 1e-4, "{pixel:?} {near:?}");
             found += 1;
         }
@@ -62,7 +67,7 @@ fn a_point_on_a_pixels_ray_is_projected_to_that_pixel() {
 fn points_that_no_calibrated_pixel_sees_have_none() {
     each_form(|blob| {
         let unseen = |camera, x, y, z| {
-            let error = blob.project(camera, &Vector3::new(x, y, z)).unwrap_err();
+            let error = blob.project(camera, [x, y, z]).unwrap_err();
             assert_eq!(error, ProjectError::Unseen);
         };
         // Behind, far to the side, at the camera itself, no number.
@@ -76,7 +81,7 @@ fn points_that_no_calibrated_pixel_sees_have_none() {
         let corner = PixelPoint::new(60.0, 45.0);
         assert!(!blob.is_calibrated(1, corner) && blob.is_calibrated(0, corner));
         let ray = blob.lookup(1, PixelPoint::new(46.0, 31.0)).unwrap();
-        let beyond = ray.direction + Vector3::new(0.25, 0.2, 0.0);
+        let beyond = Vector3::from(ray.direction) + Vector3::new(0.25, 0.2, 0.0);
         unseen(
             1,
             80.0 + 500.0 * beyond.x,
@@ -84,7 +89,7 @@ fn points_that_no_calibrated_pixel_sees_have_none() {
             500.0 * beyond.z,
         );
         assert_eq!(
-            blob.project(2, &Vector3::z()),
+            blob.project(2, [0.0, 0.0, 1.0]),
             Err(ProjectError::NoSuchCamera {
                 camera: 2,
                 count: 2
@@ -92,9 +97,9 @@ fn points_that_no_calibrated_pixel_sees_have_none() {
         );
         // A start that is nowhere is as good as the middle.
         let middle = blob.lookup(0, PixelPoint::new(31.5, 23.5)).unwrap();
-        let point = middle.origin_mm + middle.direction * 300.0;
+        let point = at(&middle, 300.0);
         let start = PixelPoint::new(f32::NAN, f32::INFINITY);
-        let pixel = blob.project_near(0, &point, start).unwrap();
+        let pixel = blob.project_near(0, point, start).unwrap();
         assert!(distance_px(pixel, PixelPoint::new(31.5, 23.5)) < 1e-4);
     });
 }
@@ -112,11 +117,11 @@ fn matches_on_an_epipolar_curve_meet() {
             let found = blob.triangulate((0, pixel), (1, point.pixel)).unwrap();
             // 1e-4 px of 2 mm at 100 mm each; along the ray by the parallax more.
             assert!(found.gap_mm() < 5e-3, "{point:?} {found:?}");
-            let depth = point.point_mm.norm();
-            assert!((found.point_mm - point.point_mm).norm() < 1e-4 * depth);
+            let [found, point] = [found.point_mm, point.point_mm].map(Vector3::from);
+            assert!((found - point).norm() < 1e-4 * point.norm());
         }
         // From far to near, without a jump.
-        let depths: Vec<f32> = points.iter().map(|p| p.point_mm.z).collect();
+        let depths: Vec<f32> = points.iter().map(|p| p.point_mm[2]).collect();
         assert!(depths.is_sorted_by(|a, b| a > b));
         let steps = points.windows(2);
         let steps = steps.map(|pair| distance_px(pair[0].pixel, pair[1].pixel));

@@ -18,8 +18,8 @@ fn the_center_of_the_sensor_looks_straight_ahead() {
     let bytes = TestBlob::new(vec![TestCamera::new("a", 7.0)]).bytes();
     let blob = RayBlob::open(bytes.bytes()).unwrap();
     let ray = blob.lookup(0, PixelPoint::new(31.5, 23.5)).unwrap();
-    assert_eq!(ray.origin_mm, Vector3::new(7.0, 0.0, 0.0));
-    assert!((ray.direction - Vector3::z()).norm() < 1e-7);
+    assert_eq!(ray.origin_mm, [7.0, 0.0, 0.0]);
+    assert!((Vector3::from(ray.direction) - Vector3::z()).norm() < 1e-7);
 }
 
 #[test]
@@ -39,10 +39,10 @@ fn every_pixel_has_its_direction(form: Form) {
             let expected = Vector3::new(s1, s2, 1.0 - (s1 * s1 + s2 * s2) / 4.0);
             let ray = blob.lookup(0, PixelPoint::new(u, v)).unwrap();
             assert!(
-                (ray.direction - expected).norm() < camera.round_off(),
+                (Vector3::from(ray.direction) - expected).norm() < camera.round_off(),
                 "{u} {v}"
             );
-            assert_eq!(ray.origin_mm, Vector3::zeros());
+            assert_eq!(ray.origin_mm, [0.0; 3]);
         }
     }
 }
@@ -62,17 +62,19 @@ fn an_offset_moves_the_ray(form: Form) {
     assert!(!blob.camera(0).unwrap().encoding.is_central);
 
     let center = blob.lookup(0, PixelPoint::new(31.5, 23.5)).unwrap();
-    assert!((center.origin_mm - Vector3::new(97.0, 4.0, 0.0)).norm() < 1e-5);
-    assert!((center.direction + Vector3::z()).norm() < 1e-6);
+    let [origin, direction] = [center.origin_mm, center.direction].map(Vector3::from);
+    assert!((origin - Vector3::new(97.0, 4.0, 0.0)).norm() < 1e-5);
+    assert!((direction + Vector3::z()).norm() < 1e-6);
 
     for (u, v) in [(0.0, 0.0), (63.0, 10.0), (20.25, 47.0)] {
         let ray = blob.lookup(0, PixelPoint::new(u, v)).unwrap();
-        let offset = ray.origin_mm - Vector3::new(100.0, 0.0, 0.0);
+        let [origin, direction] = [ray.origin_mm, ray.direction].map(Vector3::from);
+        let offset = origin - Vector3::new(100.0, 0.0, 0.0);
         let [s1, s2] = camera.s(u, v);
         // The grid holds m / (1 + s.s/4), so |m| is 5 times that; and it is across the ray.
         let length = 5.0 * (1.0 + (s1 * s1 + s2 * s2) / 4.0);
         assert!((offset.norm() - length).abs() < 2e-5);
-        assert!(offset.dot(&ray.direction).abs() < 2e-5 * ray.direction.norm());
+        assert!(offset.dot(&direction).abs() < 2e-5 * direction.norm());
     }
 }
 
@@ -130,7 +132,8 @@ fn a_region_keeps_the_pixel_coordinates_of_the_sensor() {
         blob.lookup(0, pixel).unwrap(),
         blob.lookup(1, pixel).unwrap(),
     );
-    assert!((a.direction - b.direction).norm() < 3e-7);
+    let [a, b] = [a, b].map(|ray| Vector3::from(ray.direction));
+    assert!((a - b).norm() < 3e-7);
     assert!(blob.is_calibrated(1, PixelPoint::new(19.5, 9.5)));
     assert!(!blob.is_calibrated(1, PixelPoint::new(19.4, 9.5)));
     assert!(blob.is_calibrated(1, PixelPoint::new(49.5, 34.5)));
@@ -172,7 +175,7 @@ fn two_cameras_meet_where_their_rays_cross() {
     let blob = RayBlob::open(bytes.bytes()).unwrap();
     let (a, b) = (PixelPoint::new(41.5, 23.5), PixelPoint::new(21.5, 23.5));
     let result = blob.triangulate((0, a), (1, b)).unwrap();
-    assert!((result.point_mm - Vector3::new(0.0, 0.0, 247.5)).norm() < 5e-4);
+    assert!((Vector3::from(result.point_mm) - Vector3::new(0.0, 0.0, 247.5)).norm() < 5e-4);
     assert!(result.gap_mm() < 1e-4);
 
     let many = blob.triangulate_many(&[(0, a), (1, b)]).unwrap();
@@ -231,15 +234,13 @@ fn four_cameras_around_a_point_find_it() {
         let result = blob.triangulate_many(&sightings).unwrap();
         // Pixels of up to 64 in f32 (4e-6 px) at 50 px per unit and 300 mm: 2e-5 mm across, and
         // a few times that along.
-        assert!(
-            (result.point_mm - target).norm() < 3e-4,
-            "{target} {result:?}"
-        );
+        let point = Vector3::from(result.point_mm);
+        assert!((point - target).norm() < 3e-4, "{target} {result:?}");
         assert!(result.gap_mm() < 3e-4);
         // The order of the cameras does not matter beyond round-off.
         let reversed: Vec<_> = sightings.iter().rev().copied().collect();
         let other = blob.triangulate_many(&reversed).unwrap();
-        assert!((result.point_mm - other.point_mm).norm() < 3e-4);
+        assert!((point - Vector3::from(other.point_mm)).norm() < 3e-4);
     }
 }
 
@@ -258,13 +259,13 @@ fn self_tests_pass_as_written_and_fail_when_a_bit_differs() {
     let good_ray = SelfTest::Ray {
         camera: 1,
         pixel: [b.u, b.v],
-        origin_mm: ray.origin_mm.into(),
-        direction: ray.direction.into(),
+        origin_mm: ray.origin_mm,
+        direction: ray.direction,
     };
     let pair = |gap_squared_mm2| SelfTest::Pair {
         cameras: [0, 1],
         pixels: [[a.u, a.v], [b.u, b.v]],
-        point_mm: result.point_mm.into(),
+        point_mm: result.point_mm,
         gap_squared_mm2,
     };
     let gap = result.gap_squared_mm2;

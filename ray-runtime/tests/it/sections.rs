@@ -60,7 +60,7 @@ fn the_noise_of_matches_takes_the_place_of_the_corners() {
     let (corners, matches) = (corners.covariance.unwrap(), matches.covariance.unwrap());
     assert_eq!(corners.calibration_mm2, matches.calibration_mm2);
     // The corners are off by 0.1 px; both squares are rounded once.
-    let times = matches.noise_mm2.m33 / corners.noise_mm2.m33;
+    let times = matches.noise_mm2[2][2] / corners.noise_mm2[2][2];
     assert!((times / 14.0625 - 1.0).abs() < 1e-6, "{times}");
     // What a request says counts, whatever the blob says.
     for blob in [&plain, &noisy] {

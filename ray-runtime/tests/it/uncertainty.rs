@@ -93,7 +93,9 @@ fn by_differences(blob: &RayBlob<'_>, pixels: [[f32; 2]; 2]) -> Matrix4<f64> {
         let found = blob.triangulate_with_covariance((0, at(pixels[0])), (1, at(pixels[1])));
         let found = found.unwrap();
         let gap_mm = f64::from(found.signed_gap_mm());
-        found.found.point_mm.cast::<f64>().push(gap_mm)
+        Vector3::from(found.found.point_mm)
+            .cast::<f64>()
+            .push(gap_mm)
     };
     Matrix4::from_columns(&[0, 1, 2, 3].map(|k| {
         let mut moved = [pixels, pixels];
@@ -113,7 +115,13 @@ fn factor() -> Matrix4<f64> {
     ) * 0.002
 }
 
-fn assert_near(found: &Matrix3<f32>, expected: &Matrix3<f64>, what: &str) {
+/// Symmetric: rows or columns first is the same.
+fn matrix(rows: [[f32; 3]; 3]) -> Matrix3<f32> {
+    rows.into()
+}
+
+fn assert_near(found: &[[f32; 3]; 3], expected: &Matrix3<f64>, what: &str) {
+    let found = matrix(*found);
     // The derivative by differences is off by 1e-3 of itself (third derivatives, round-off).
     let error = (found.cast::<f64>() - expected).norm() / expected.norm();
     assert!(error < 5e-3, "{what}: {error}\n{found}\n{expected}");
@@ -152,7 +160,7 @@ fn covariance_is_carried(form: Form) {
         assert_near(&covariance.noise_mm2, &noise, "noise");
         let total = covariance.total_mm2();
         for (k, sigma) in covariance.sigma_mm().into_iter().enumerate() {
-            assert!((sigma * sigma - total[(k, k)]).abs() <= 1e-6 * total[(k, k)]);
+            assert!((sigma * sigma - total[k][k]).abs() <= 1e-6 * total[k][k]);
         }
     }
 }
@@ -165,9 +173,9 @@ fn the_order_of_the_cameras_does_not_matter() {
         let (a, b) = ((0, at(first)), (1, at(second)));
         let one = blob.triangulate_with_covariance(a, b).unwrap();
         let other = blob.triangulate_with_covariance(b, a).unwrap();
-        let difference =
-            one.covariance.unwrap().total_mm2() - other.covariance.unwrap().total_mm2();
-        assert!(difference.norm() < 1e-5 * one.covariance.unwrap().total_mm2().norm());
+        let [total, other_total] =
+            [one, other].map(|measured| matrix(measured.covariance.unwrap().total_mm2()));
+        assert!((total - other_total).norm() < 1e-5 * total.norm());
         let [gap, other_gap] = [one, other].map(|m| m.covariance.unwrap().gap_mm2);
         assert!((gap - other_gap).abs() < 1e-5 * gap);
         // A tenth of a pixel lower, the second ray passes below the first, whichever is asked first.

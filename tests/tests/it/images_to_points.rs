@@ -83,8 +83,9 @@ fn every_pixel_has_the_ray_of_the_field(calibration: &Calibration, bytes: &[u8])
                 let pixel = PixelPoint::new(f64::from(u), f64::from(v));
                 assert_eq!(ray.is_ok(), camera.coverage.contains(pixel), "{pixel:?}");
                 let Ok(ray) = ray else { continue };
-                let direction = ray.direction.map(f64::from).normalize();
-                let point_in_rig = ray.origin_mm.map(f64::from) + direction * distance_mm;
+                let in_f64 = |of_ray: [f32; 3]| nalgebra::Vector3::from(of_ray.map(f64::from));
+                let direction = in_f64(ray.direction).normalize();
+                let point_in_rig = in_f64(ray.origin_mm) + direction * distance_mm;
                 let seen = linearize(
                     &camera.field.sample(pixel),
                     &camera_from_rig.point(&point_in_rig),

@@ -133,15 +133,17 @@ impl PointSource for BlobSource<'_> {
         })?;
         let point_mm = match &self.rig_from_frame {
             None => found.point_mm,
-            Some(rig_from_frame) => in_frame(rig_from_frame, &found.point_mm),
+            Some(rig_from_frame) => in_frame(rig_from_frame, found.point_mm),
         };
         Ok(Point {
-            point_mm: point_mm.into(),
+            point_mm,
             gap_mm: found.gap_mm(),
             sigma_mm: covariance.map(|covariance| match &self.rig_from_frame {
                 // In the blob's own frame these are the device's bits.
                 None => covariance.sigma_mm(),
-                Some(rig_from_frame) => sigma_in_frame(rig_from_frame, &covariance.total_mm2()),
+                Some(rig_from_frame) => {
+                    sigma_in_frame(rig_from_frame, &covariance.total_matrix_mm2())
+                }
             }),
         })
     }
@@ -165,7 +167,7 @@ impl PointSource for BlobSource<'_> {
 
     fn covariance_mm2(&self, sightings: &[Sighting<f32>]) -> Option<Matrix3<f64>> {
         let [a, b] = *sightings else { return None };
-        let in_rig = self.pair(a, b).ok()?.covariance?.total_mm2();
+        let in_rig = self.pair(a, b).ok()?.covariance?.total_matrix_mm2();
         let covariance_mm2 = match &self.rig_from_frame {
             None => in_rig,
             Some(rig_from_frame) => covariance_in_frame(rig_from_frame, &in_rig),
@@ -178,7 +180,8 @@ fn covariance_in_frame(
     rig_from_frame: &ray_runtime::RigFromCamera,
     covariance_mm2: &Matrix3<f32>,
 ) -> Matrix3<f32> {
-    let rotation = &rig_from_frame.rotation;
+    let rotation = rig_from_frame.rotation_matrix();
+    let rotation = rotation.matrix();
     rotation.transpose() * covariance_mm2 * rotation
 }
 
@@ -191,6 +194,8 @@ fn sigma_in_frame(
     [0, 1, 2].map(|k| in_frame[(k, k)].max(0.0).sqrt())
 }
 
-fn in_frame(rig_from_frame: &ray_runtime::RigFromCamera, point_mm: &Vector3<f32>) -> Vector3<f32> {
-    rig_from_frame.rotation.transpose() * (point_mm - rig_from_frame.translation_mm)
+fn in_frame(rig_from_frame: &ray_runtime::RigFromCamera, point_mm: [f32; 3]) -> [f32; 3] {
+    let [point_mm, translation_mm] = [point_mm, rig_from_frame.translation_mm].map(Vector3::from);
+    let frame_from_rig = rig_from_frame.rotation_matrix().inverse();
+    (frame_from_rig * (point_mm - translation_mm)).into()
 }

@@ -227,11 +227,12 @@ impl<'a> Judge<'a> {
     fn errors(&self, exact: &FieldSample, ray: &ray_runtime::Ray) -> [f64; 2] {
         let rig_from_camera = &self.camera.rig_from_camera;
         let turned_back = rig_from_camera.rotation.transpose();
-        let origin = ray.origin_mm.map(f64::from) - rig_from_camera.translation_mm;
+        let in_f64 = |of_ray: [f32; 3]| Vector3::from(of_ray.map(f64::from));
+        let origin = in_f64(ray.origin_mm) - rig_from_camera.translation_mm;
         // Both rays in the axes of the exact one: its own direction is z.
         let local_from_rig = transport::frame(&exact.s).transpose() * turned_back;
         let origin = local_from_rig * origin;
-        let direction = local_from_rig * ray.direction.map(f64::from);
+        let direction = local_from_rig * in_f64(ray.direction);
         if direction.z <= 0.0 {
             return [f64::INFINITY; 2];
         }

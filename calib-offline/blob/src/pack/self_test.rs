@@ -72,8 +72,8 @@ fn ask_ray(blob: &RayBlob<'_>, camera: usize, pixel: PixelPoint) -> Option<SelfT
     Some(SelfTest::Ray {
         camera: camera as u16,
         pixel: [pixel.u, pixel.v],
-        origin_mm: ray.origin_mm.into(),
-        direction: ray.direction.into(),
+        origin_mm: ray.origin_mm,
+        direction: ray.direction,
     })
 }
 
@@ -100,7 +100,7 @@ impl Asked {
         SelfTest::Pair {
             cameras: self.cameras,
             pixels: self.pixels,
-            point_mm: found.point_mm.into(),
+            point_mm: found.point_mm,
             gap_squared_mm2: found.gap_squared_mm2,
         }
     }

@@ -94,10 +94,15 @@ fn compared(
     Some([
         (ours.calibration_mm2, ours.noise_mm2),
         (
-            theirs.calibration_mm2.map(f64::from),
-            theirs.noise_mm2.map(f64::from),
+            symmetric(&theirs.calibration_mm2),
+            symmetric(&theirs.noise_mm2),
         ),
     ])
+}
+
+/// Rows and columns are the same.
+fn symmetric(rows: &[[f32; 3]; 3]) -> Matrix3<f64> {
+    Matrix3::from(*rows).map(f64::from)
 }
 
 #[derive(Debug, Default)]

@@ -458,7 +458,7 @@ fn blob_and_host_give_the_same_points_within_single_precision() {
         for count in [2, 3] {
             let host = rig.triangulate(&sightings[..count]).unwrap();
             let blob = blob.triangulate_many(&asked[..count]).unwrap();
-            let difference = (blob.point_mm.map(f64::from) - host.point_mm).norm();
+            let difference = (Vector3::from(blob.point_mm.map(f64::from)) - host.point_mm).norm();
             assert!(difference < limit_mm, "{difference} of {limit_mm}");
             let gap_difference = (f64::from(blob.gap_mm()) - host.gap_mm).abs();
             assert!(gap_difference < limit_mm, "{gap_difference}");

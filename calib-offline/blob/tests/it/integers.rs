@@ -27,8 +27,8 @@ fn a_blob_measures_in_integers_what_a_device_does() {
             continue;
         };
         points += 1;
-        let device: [f32; 3] = device.unwrap().point_mm.into();
-        assert_eq!(found.point_mm.map(f32::to_bits), device.map(f32::to_bits));
+        let device = device.unwrap().point_mm.map(f32::to_bits);
+        assert_eq!(found.point_mm.map(f32::to_bits), device);
         assert_eq!(found.sigma_mm, None);
         let float = floats.point(&match_).unwrap();
         assert!(float.sigma_mm.is_some());

@@ -6,13 +6,14 @@
 #![no_std]
 #![no_main]
 
+use core::cell::RefCell;
 use core::hint::black_box;
 
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hio;
 use firmware_cortex_m::machine;
-use firmware_cost::counting::{Job, Probe, Record, job_start};
-use ray_runtime::{PixelPoint, RayBlob, format, triangulate_pair};
+use firmware_cost::counting::{Job, Probe, ROW_LEN, Record, job_start};
+use ray_runtime::{PixelPoint, Ray, RayBlob, Row, format, triangulate_pair};
 
 /// What a probe works on.
 struct Task<'a> {
@@ -21,6 +22,7 @@ struct Task<'a> {
     job: Job<'a>,
     cameras: [usize; 2],
     pixels: [PixelPoint; 2],
+    rays: RefCell<[Ray; ROW_LEN]>,
 }
 
 type Work = fn(&Task<'_>) -> bool;
@@ -43,6 +45,7 @@ fn run() -> Option<()> {
         job,
         cameras: job.cameras,
         pixels: [PixelPoint::new(0.0, 0.0); 2],
+        rays: RefCell::new([Ray::OUTSIDE; ROW_LEN]),
     };
     let mut output = hio::hstdout().ok()?;
     machine::counter_start();
@@ -53,6 +56,8 @@ fn run() -> Option<()> {
                 continue;
             }
             let (ticks, answered) = ticks_of(work(probe), &task);
+            let is_row = matches!(probe, Probe::RowFirst | Probe::RowSecond);
+            let answered = answered && !(is_row && has_outside(&task));
             let (stack_bytes, _) = machine::stack_bytes_of(work(probe), &task);
             let record = Record {
                 probe: probe as u32,
@@ -65,6 +70,12 @@ fn run() -> Option<()> {
         }
     }
     Some(())
+}
+
+/// Whether a pixel of the row that was looked up last is not calibrated.
+fn has_outside(task: &Task<'_>) -> bool {
+    let rays = task.rays.try_borrow();
+    rays.is_ok_and(|rays| rays.iter().any(Ray::is_outside))
 }
 
 /// Ticks between the look at the timer before a call and the one behind it.
@@ -91,6 +102,8 @@ fn work(probe: Probe) -> Work {
         Probe::BilinearTriangulate => bilinear_triangulate,
         Probe::BrownUndistortion => brown_undistortion,
         Probe::BrownTriangulate => brown_triangulate,
+        Probe::RowFirst => row_first,
+        Probe::RowSecond => row_second,
     })
 }
 
@@ -117,6 +130,31 @@ fn lookup_first(task: &Task<'_>) -> bool {
 
 fn lookup_second(task: &Task<'_>) -> bool {
     written(&task.blob.lookup(task.cameras[1], task.pixels[1])).is_ok()
+}
+
+fn row_first(task: &Task<'_>) -> bool {
+    row(task, 0)
+}
+
+fn row_second(task: &Task<'_>) -> bool {
+    row(task, 1)
+}
+
+/// The rays of a row that has the pixel of the match among its own.
+#[inline(always)]
+fn row(task: &Task<'_>, camera: usize) -> bool {
+    let pixel = task.pixels[camera];
+    let first_u = (pixel.u as u32 & !(ROW_LEN as u32 - 1)) as f32;
+    let row = Row {
+        first: PixelPoint::new(first_u, pixel.v as u32 as f32),
+        step_px: 1,
+    };
+    let Ok(mut rays) = task.rays.try_borrow_mut() else {
+        return false;
+    };
+    let found = task.blob.lookup_row(task.cameras[camera], &row, &mut *rays);
+    written(&*rays);
+    found.is_ok()
 }
 
 fn triangulate(task: &Task<'_>) -> bool {

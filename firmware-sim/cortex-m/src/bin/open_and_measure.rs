@@ -60,7 +60,7 @@ fn main() -> ! {
         match blob.triangulate_with_covariance((0, a), (1, b)) {
             Ok(measured) => {
                 let found = measured.found;
-                let [x, y, z]: [f32; 3] = found.point_mm.into();
+                let [x, y, z] = found.point_mm;
                 hprintln!(
                     "point {:.1} {:.1} {:.1} mm, gap {:.1} mm",
                     x,

@@ -42,8 +42,8 @@ fn differences(blob: &RayBlob<'_>, test: &SelfTest) -> Option<[f32; 2]> {
         } => {
             let ray = blob.lookup(camera.into(), pixel(at)).ok()?;
             Some([
-                largest(ray.origin_mm.into(), origin_mm),
-                largest(ray.direction.into(), direction),
+                largest(ray.origin_mm, origin_mm),
+                largest(ray.direction, direction),
             ])
         }
         SelfTest::Pair {
@@ -53,7 +53,7 @@ fn differences(blob: &RayBlob<'_>, test: &SelfTest) -> Option<[f32; 2]> {
             ..
         } => {
             let found = blob.triangulate((a.into(), pixel(at_a)), (b.into(), pixel(at_b)));
-            Some([largest(found.ok()?.point_mm.into(), point_mm), 0.0])
+            Some([largest(found.ok()?.point_mm, point_mm), 0.0])
         }
         SelfTest::Sigma {
             cameras: [a, b],

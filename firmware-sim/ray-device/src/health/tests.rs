@@ -1,18 +1,17 @@
 use super::*;
-use nalgebra::{Matrix3, Vector3};
 use ray_runtime::{PointCovariance, Triangulation};
 use split_mix::SplitMix;
 
 fn measurement(gap_mm: f32, sigma_mm: Option<f32>) -> Measurement {
     Measurement {
         found: Triangulation {
-            point_mm: Vector3::zeros(),
+            point_mm: [0.0; 3],
             gap_squared_mm2: gap_mm * gap_mm,
         },
         is_second_above: gap_mm >= 0.0,
         covariance: sigma_mm.map(|sigma_mm| PointCovariance {
-            calibration_mm2: Matrix3::zeros(),
-            noise_mm2: Matrix3::zeros(),
+            calibration_mm2: [[0.0; 3]; 3],
+            noise_mm2: [[0.0; 3]; 3],
             gap_mm2: sigma_mm * sigma_mm,
         }),
     }
