@@ -285,7 +285,7 @@ fn holes_in_the_mask_have_no_rays() {
             counts.iter().all(|count| *count > 1000),
             "{name} {counts:?}"
         );
-    });
+    }
 }
 
 /// Where the first camera's mask starts in a golden blob: word 6 of its record.
