@@ -89,7 +89,7 @@ fn points_are_those_of_f32_and_so_are_refusals() {
             let second = blob.lookup(0, first).ok().and_then(|ray| {
                 let seen = [0, 1, 2].map(|k| ray.origin_mm[k] + ray.direction[k] * depth);
                 let start = PixelPoint::new(32.0, 24.0);
-                blob.project_near(1, &seen, start).ok()
+                blob.project_near(1, seen, start).ok()
             });
             let second = second.unwrap_or(PixelPoint::new(10.0, 10.0));
             let second = PixelPoint::new(
