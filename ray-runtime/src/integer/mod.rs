@@ -22,7 +22,7 @@
 //! let (left, right) = (PixelPoint::new(30.0, 20.5), PixelPoint::new(33.0, 21.0));
 //! let point = rig.triangulate((0, left), (1, right)).unwrap();
 //! let same = blob.triangulate((0, left), (1, right)).unwrap();
-//! assert!((point.point_mm[2] - same.point_mm[2]).abs() < 0.001);
+//! assert!((point.point_mm[2] - same.point_mm[2]).abs() < 0.01);
 //!
 //! // All in fixed point: pixels in 65536ths, points in steps of a power of two of a millimeter.
 //! let pixel = |u: i32, v: i32| FixedPixel { u, v };
