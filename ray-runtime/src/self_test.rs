@@ -31,6 +31,16 @@ pub struct SelfTestFailure {
 }
 
 impl SelfTest {
+    /// How many numbers another arithmetic answers with ([`Arithmetic`](crate::format::Arithmetic)).
+    #[cfg(feature = "integer")]
+    pub const fn answer_len(&self) -> usize {
+        match self {
+            Self::Ray { .. } => 6,
+            Self::Pair { .. } => 4,
+            Self::Sigma { .. } => 0,
+        }
+    }
+
     /// Whether the blob gives the answer, bit for bit.
     pub fn passes(&self, blob: &RayBlob<'_>) -> bool {
         match *self {

@@ -11,7 +11,7 @@
 mod refusal;
 
 use heapless::{String, Vec};
-use ray_runtime::Measurement;
+use ray_runtime::{Measurement, Triangulation};
 use serde::{Deserialize, Serialize};
 
 use crate::health::GapReport;
@@ -75,6 +75,9 @@ pub enum Request {
     /// Triangulate these, whose pixels are as noisy as said here. Answered by [`Reply::Measured`], or refused with
     /// [`Refusal::BadNoise`]. A device that does not know it answers [`Refusal::UnknownMessage`].
     MeasureNoisy(NoisyMatches),
+    /// Triangulate these without their standard deviations, which take four times as long as the points. Answered by
+    /// [`Reply::Measured`]; such points do not count into [`Status::gaps`].
+    MeasurePoints(Vec<Match, MAX_MATCHES>),
 }
 
 /// What a device answers.
@@ -238,7 +241,8 @@ pub struct Point {
     pub gap_squared_mm2: f32,
     /// Predicted standard deviation along x, y and z of the rig's frame, mm: what the calibration
     /// leaves uncertain, and the pixels' noise, which is that of the request, else that of the blob's matches, else
-    /// that of the calibration's corners. `None` where the blob does not say.
+    /// that of the calibration's corners. `None` where the blob does not say, of [`Request::MeasurePoints`] and from a
+    /// device that computes in integers.
     pub sigma_mm: Option<[f32; 3]>,
 }
 
@@ -248,6 +252,16 @@ impl From<Measurement> for Point {
             point_mm: measured.found.point_mm,
             gap_squared_mm2: measured.found.gap_squared_mm2,
             sigma_mm: measured.covariance.map(|covariance| covariance.sigma_mm()),
+        }
+    }
+}
+
+impl From<Triangulation> for Point {
+    fn from(found: Triangulation) -> Self {
+        Self {
+            point_mm: found.point_mm,
+            gap_squared_mm2: found.gap_squared_mm2,
+            sigma_mm: None,
         }
     }
 }
@@ -315,6 +329,18 @@ pub struct Status {
     pub rig: Option<Rig>,
     /// The gaps of what it has measured with this blob; `None` before the first point.
     pub gaps: Option<GapReport>,
+    /// What it computes points in.
+    pub arithmetic: Arithmetic,
+}
+
+/// What a device computes rays and points in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Arithmetic {
+    /// Numbers of f32.
+    #[default]
+    Float,
+    /// Integers. Its points have no standard deviations, and do not count into [`Status::gaps`].
+    Integer,
 }
 
 /// What a slot holds.

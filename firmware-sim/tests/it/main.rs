@@ -20,6 +20,8 @@ mod flashing;
 #[cfg(feature = "command")]
 mod float_modes;
 #[cfg(feature = "command")]
+mod integer;
+#[cfg(feature = "command")]
 mod qemu;
 #[cfg(feature = "command")]
 mod running;

@@ -7,6 +7,8 @@ mod cpp_interface;
 mod damage;
 mod document;
 mod golden;
+#[cfg(feature = "integer")]
+mod integer;
 mod project;
 mod questions;
 mod rows;
