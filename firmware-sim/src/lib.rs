@@ -2,4 +2,6 @@
 
 #[cfg(feature = "client")]
 pub mod client;
+#[cfg(feature = "signed")]
+pub mod owner;
 pub mod simulated;

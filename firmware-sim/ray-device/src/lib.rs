@@ -6,6 +6,7 @@ pub mod app;
 pub mod cobs;
 pub mod frame;
 pub mod health;
+pub mod manifest;
 pub mod port;
 pub mod protocol;
 pub mod session;

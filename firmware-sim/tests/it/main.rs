@@ -2,8 +2,16 @@
 //! that is killed, and as an image in QEMU; what images cost.
 
 mod app;
+#[cfg(feature = "signed")]
+mod attacks;
+#[cfg(feature = "signed")]
+mod owner;
 mod parts;
 mod power_cuts;
+#[cfg(feature = "command")]
+mod qemu;
+#[cfg(feature = "signed")]
+mod requests;
 mod rig;
 mod snapshots;
 mod tcp;
@@ -12,13 +20,11 @@ mod tcp;
 mod cost;
 #[cfg(feature = "command")]
 mod flashing;
-#[cfg(feature = "command")]
-mod qemu;
+#[cfg(all(feature = "command", feature = "signed"))]
+mod owned;
 #[cfg(feature = "command")]
 mod running;
 #[cfg(feature = "command")]
 mod same_bits;
 #[cfg(all(feature = "serial", unix))]
 mod serial;
-#[cfg(feature = "signed")]
-mod signed;

@@ -477,7 +477,7 @@ fn the_factory_blob_is_there_when_nothing_else_is() {
     let made: &[u8] = bytemuck::cast_slice(&aligned);
     for (name, rules) in REAL_PARTS {
         let mut flash = blank(rules);
-        let mut active = |flash: &mut SimFlash, requests: &[Request]| {
+        let active = |flash: &mut SimFlash, requests: &[Request]| {
             let replies = ask_with_factory(flash, made, requests);
             if let Some(Reply::Refused(refusal)) = replies.last() {
                 return Err(*refusal);
