@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 checksum: checksum(other),
                 identity: *identity,
                 rig_serial: None,
-                signature: None,
+                manifest: heapless::Vec::new(),
             })?;
             client.chunk(0, &other[..512])?;
         }

@@ -13,13 +13,15 @@ use std::time::{Duration, Instant};
 
 use ray_device::frame::{DELIMITER, FrameReader, FrameWriter, NO_SEQUENCE, Received, Rejected};
 use ray_device::protocol::{
-    Hello, MAX_MATCHES, Match, Measured, NoisyMatches, Refusal, Reply, Request, SelfTestReport,
-    Status, StoredBlob,
+    Hello, MAX_MATCHES, Match, Measured, NoisyMatches, Order, Refusal, Reply, Request,
+    SelfTestReport, Status, StoredBlob,
 };
 
 use ray_runtime::MatchNoise;
 
 pub use error::ClientError;
+#[cfg(feature = "signed")]
+pub(crate) use flash::ask_blob;
 pub use flash::{Begun, FlashOptions, FlashProgress, Flashed};
 pub use transport::Transport;
 
@@ -154,7 +156,8 @@ impl DeviceClient {
         }
     }
 
-    /// Makes the blob of the other slot active, after the device has checked all of it.
+    /// Makes the blob of the other slot active, after the device has checked all of it. On a device with an
+    /// owner: [`DeviceClient::order`].
     ///
     /// # Errors
     /// [`ClientError`]; [`Refusal::NothingToRollBackTo`] inside it if there is none.
@@ -162,6 +165,20 @@ impl DeviceClient {
         match self.ask(&Request::Rollback)? {
             Reply::Active(stored) => Ok(stored),
             reply => Err(unexpected("rollback", &reply)),
+        }
+    }
+
+    /// What the owner of a device orders. For a rollback the blob that is active then; `None` where an
+    /// update was given up.
+    ///
+    /// # Errors
+    /// [`ClientError`]; inside it [`Refusal::StaleOrder`] and [`Refusal::BadSignature`] for an order that is
+    /// not for this device and moment, and the refusals of what was ordered.
+    pub fn order(&mut self, order: &Order) -> Result<Option<StoredBlob>, ClientError> {
+        match self.ask(&Request::Order(*order))? {
+            Reply::Active(stored) => Ok(Some(stored)),
+            Reply::Aborted => Ok(None),
+            reply => Err(unexpected("an order", &reply)),
         }
     }
 

@@ -2,6 +2,8 @@
 
 #[cfg(feature = "client")]
 pub mod client;
+#[cfg(feature = "signed")]
+pub mod owner;
 pub mod simulated;
 #[cfg(feature = "simulated")]
 pub mod slot_image;

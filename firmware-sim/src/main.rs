@@ -11,13 +11,14 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use cost::InQemu;
 use firmware_cost::{CORES, Core};
+use firmware_sim::owner::{self, KeyError};
 use firmware_sim::simulated::flash_file::{self, FlashFile};
 use firmware_sim::simulated::host::SimulatedDevice;
 use firmware_sim::simulated::qemu::{self, QemuDevice};
 use firmware_sim::simulated::sim_flash::{BadRules, Rules};
 use firmware_sim::slot_image::Part;
 use ray_device::protocol::{Arithmetic, CameraStatus, MAX_CAMERAS_LISTED, MAX_NAME, Rig, name};
-use ray_device::storage::trust::{PublicKey, Trust};
+use ray_device::storage::trust::{Keys, PublicKey, Trust};
 
 /// A measuring device, simulated.
 ///
@@ -52,7 +53,7 @@ enum Command {
         #[command(flatten)]
         device: DeviceArguments,
         /// Run this image instead of building one; whose blobs it takes was settled when it was built.
-        #[arg(long, value_name = "ELF", conflicts_with = "public_key")]
+        #[arg(long, value_name = "ELF", conflicts_with = "public_keys")]
         image: Option<PathBuf>,
     },
     /// What the runtime costs on a Cortex-M4F, or on other cores: instructions counted in QEMU, stack, code. The images
@@ -97,9 +98,10 @@ struct DeviceArguments {
     /// order. Such a device refuses blobs for other cameras.
     #[arg(long = "camera", value_name = "NAME=WIDTHxHEIGHT", value_parser = camera)]
     cameras: Vec<CameraStatus>,
-    /// Take only blobs signed by the owner of this Ed25519 key; in QEMU, the image is built for it.
-    #[arg(long, value_name = "64 HEX DIGITS", value_parser = public_key)]
-    public_key: Option<PublicKey>,
+    /// The public key of the device's owner, who alone may change it then: 64 hexadecimal digits or a PEM file.
+    /// Given twice, these are key 0 and key 1. In QEMU, the image is built for them.
+    #[arg(long = "public-key", value_name = "KEY", value_parser = public_key)]
+    public_keys: Vec<PublicKey>,
     /// Serial number of a new device's rig.
     #[arg(long, value_name = "TEXT", requires = "cameras")]
     serial: Option<String>,
@@ -117,6 +119,19 @@ impl DeviceArguments {
         Ok(Some(Rig { serial, cameras }))
     }
 
+    /// Who may change the device.
+    fn trust(&self) -> Result<Trust, Failure> {
+        match self.public_keys[..] {
+            [] => Ok(Trust::Anybody),
+            [key] => Ok(Trust::Owner(Keys::one(key))),
+            [key_0, key_1] if key_0 == key_1 => {
+                Err("key 0 and key 1 are the same: give key 1 when there is another".into())
+            }
+            [key_0, key_1] => Ok(Trust::Owner(Keys::two(key_0, key_1))),
+            _ => Err("a device has two keys at most: give --public-key once or twice".into()),
+        }
+    }
+
     /// The flash that the device starts with, and the file that it is kept in.
     fn flash(&self, rules: Option<Rules>) -> Result<FlashFile, Failure> {
         let rig = self.rig()?;
@@ -124,7 +139,9 @@ impl DeviceArguments {
             let flash = flash_file::blank_with(rules.unwrap_or_default(), rig.as_ref())?;
             return Ok(FlashFile::in_memory(flash));
         };
-        let file = FlashFile::open_with(path, rules, rig.as_ref())?;
+        let mut file = FlashFile::open_with(path, rules, rig.as_ref())?;
+        flash_file::check_owner(&mut file.flash, self.trust()?)
+            .map_err(|error| format!("{}: {error}", path.display()))?;
         if file.kept_in.is_none() {
             eprintln!(
                 "firmware-sim: {} is a blob, not the flash of a device: it stays as it is, and what the device is sent is forgotten when it stops. To keep it: --flash-file device.flash, then calib-offline flash {0} --device tcp:ADDRESS:PORT",
@@ -140,8 +157,16 @@ fn flash_rules(text: &str) -> Result<Rules, BadRules> {
 }
 
 fn public_key(text: &str) -> Result<PublicKey, String> {
-    PublicKey::from_hex(text)
-        .ok_or_else(|| "give the key's 32 bytes as 64 hexadecimal digits".to_owned())
+    let read = match owner::public_key(text) {
+        Err(KeyError::NotAKey) => {
+            let file = std::fs::read_to_string(text).map_err(|error| {
+                format!("neither 64 hexadecimal digits nor a file that can be read ({error})")
+            })?;
+            owner::public_key(&file)
+        }
+        outcome => outcome,
+    };
+    read.map_err(|error| error.to_string())
 }
 
 fn camera(text: &str) -> Result<CameraStatus, String> {
@@ -243,8 +268,8 @@ fn run_on_host(
     rules: Option<Rules>,
     arithmetic: ArithmeticArg,
 ) -> Result<(), Failure> {
+    let trust = arguments.trust()?;
     let FlashFile { flash, kept_in } = arguments.flash(rules)?;
-    let trust = arguments.public_key.map_or(Trust::Anybody, Trust::Signed);
     let arithmetic = match arithmetic {
         ArithmeticArg::F32 => Arithmetic::Float,
         ArithmeticArg::Integer => Arithmetic::Integer,
@@ -260,13 +285,14 @@ fn run_on_host(
 fn run_in_qemu(arguments: &DeviceArguments, image: Option<&Path>) -> Result<(), Failure> {
     // Before the image, whose first build takes a minute.
     qemu::require_qemu()?;
+    let trust = arguments.trust()?;
     let flash = arguments.flash(None)?;
     let image = if let Some(path) = image {
         path.to_owned()
     } else {
         eprintln!("firmware-sim: building the image, unless it is up to date");
-        match &arguments.public_key {
-            Some(key) => qemu::build_signed_image("device_signed", &key.to_string())?,
+        match trust.keys() {
+            Some(keys) => qemu::build_signed_image("device_signed", keys)?,
             None => qemu::build_image("device")?,
         }
     };

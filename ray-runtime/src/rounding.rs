@@ -8,6 +8,7 @@ use core::hint::black_box;
 
 /// A rounding mode in which no blob opens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Rounding {
     /// Up: RP of an Arm FPSCR, RUP of RISC-V.
     TowardPositive,

@@ -3,7 +3,7 @@
 use super::settings::CommonArgs;
 use super::{
     audit, calibrate, compare, demo, detect, device, evaluate, export, flash, import, inspect,
-    measure, methods, pack, rays, simulate, target, verify,
+    keygen, measure, methods, pack, rays, sign, simulate, target, verify,
 };
 use clap::{Parser, Subcommand};
 
@@ -72,6 +72,8 @@ pub enum Verb {
     Import(import::ImportArgs),
     /// Say what a dataset, a calibration or a blob is
     Inspect(inspect::InspectArgs),
+    /// Make a key for the owner of devices
+    Keygen(keygen::KeygenArgs),
     /// Triangulate matches
     Measure(measure::MeasureArgs),
     /// Compare the ray field with a pinhole on the same boards
@@ -80,6 +82,8 @@ pub enum Verb {
     Pack(pack::PackArgs),
     /// Look up the rays of single pixels
     Rays(rays::RaysArgs),
+    /// Sign a blob for devices that have an owner
+    Sign(sign::SignArgs),
     /// Make a dataset with known truth
     #[command(before_help = SIMULATE_EXAMPLE, after_help = SIMULATE_FORMATS)]
     Simulate(simulate::SimulateArgs),

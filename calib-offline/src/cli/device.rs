@@ -2,20 +2,26 @@
 
 use super::Outcome;
 use super::error::Error;
+use super::key_file;
 use super::output::Console;
 use super::usage_error::UsageError;
 use crate::device::{DeviceError, DeviceState, connect, state_in_words};
 use calib_recording::dataset::identity::hex;
 use clap::{Args, Subcommand};
-use firmware_sim::client::DeviceClient;
+use firmware_sim::client::{ClientError, DeviceClient};
+use ray_device::manifest::{Action, OrderText};
+use ray_device::protocol::{Order, Refusal, SlotState};
+use ray_device::storage::trust::KeyId;
 use serde::Serialize;
+use std::path::PathBuf;
 use std::time::Duration;
 
 const EXAMPLE: &str = "\
 Example:
   calib-offline device --device tcp:127.0.0.1:7777 status
   calib-offline device --device serial:/dev/ttyACM0 selftest
-  calib-offline device --device tcp:127.0.0.1:7777 rollback";
+  calib-offline device --device tcp:127.0.0.1:7777 rollback
+  calib-offline device --device tcp:127.0.0.1:7777 rollback --key key.pem";
 
 const FORMATS: &str = "\
 status    what it measures with, what its two slots hold, and whether the calibration still fits: the
@@ -23,17 +29,21 @@ status    what it measures with, what its two slots hold, and whether the calibr
           blob predicts. Gaps do not see an error of scale or of the cameras' distance.
 selftest  the blob's self-tests, computed on the device; they must give the packing host's bits. A device that
           computes in integers compares those that the blob states for integers (pack --arithmetic integer)
-rollback  the blob in the other slot, after a check of all of it, becomes the one in use
+rollback  the blob in the other slot, after a check of all of it, becomes the one in use; a device with an
+          owner does so only on an order that is signed with --key, for this device and this moment
+abort     an update that is under way is given up, on a device with an owner with --key
 
 Exit code 1: the gaps say that the cameras have moved, or a self-test gave other bits.
 
 With --json, status, schema calib-offline/device-status/1:
   device, firmware, uptime_ms, answered, refused, updates, rollbacks, max_blob_bytes
   blob (identity, bytes, camera_count, cameras (name, width_px, height_px)), open_error
-  slots (state, is_active, sequence, bytes, checksum, identity, open_error)
+  slots (state, is_active, sequence, bytes, checksum, identity, version, open_error)
                  state: empty, receiving, holds (all but open_error) or unusable (sequence,
-                 open_error)
+                 open_error); version: null without an owner
   update (identity, bytes, received_bytes)
+  owner (keys, newest_version, least_version, retired_below)
+                 null: anybody may change it; keys: the first 16 digits of each, or null
   rig (serial, cameras (name, width_px, height_px))
   arithmetic     what it computes points in: f32 or integer
   gaps (verdict, points, mean_signed_mm, mean_size_mm, within_95_mm, predicted (points,
@@ -42,7 +52,9 @@ With --json, status, schema calib-offline/device-status/1:
 With --json, selftest, schema calib-offline/device-selftest/1:
   tests, equal, unanswered, worst_mm, worst_direction
 With --json, rollback, schema calib-offline/device-rollback/1:
-  slot, sequence, bytes, identity";
+  slot, sequence, bytes, identity
+With --json, abort, schema calib-offline/device-abort/1:
+  was_under_way";
 
 /// The arguments.
 #[derive(Debug, Args)]
@@ -60,14 +72,24 @@ pub struct DeviceArgs {
 }
 
 /// What to ask.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Subcommand)]
+#[derive(Debug, Clone, PartialEq, Eq, Subcommand)]
 pub enum Question {
     /// How it is, and whether its calibration still fits
     Status,
     /// Whether it computes the bits of the host that packed its blob
     Selftest,
     /// Go back to the blob in the other slot
-    Rollback,
+    Rollback(OrderArgs),
+    /// Give up an update that is under way
+    Abort(OrderArgs),
+}
+
+/// What the owner of a device orders.
+#[derive(Debug, Clone, PartialEq, Eq, Args)]
+pub struct OrderArgs {
+    /// The owner's private key, for a device that has one
+    #[arg(long, value_name = "KEY.pem")]
+    pub key: Option<PathBuf>,
 }
 
 /// What `--json` prints of the status.
@@ -99,6 +121,13 @@ struct RollbackObject {
     identity: String,
 }
 
+/// What `--json` prints of an update that was given up.
+#[derive(Debug, Serialize)]
+struct AbortObject {
+    schema: &'static str,
+    was_under_way: bool,
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -109,10 +138,11 @@ pub fn run(args: &DeviceArgs, console: &Console) -> Result<Outcome, Error> {
         .as_deref()
         .ok_or(Error::Usage(UsageError::NoDevice))?;
     let mut client = connect(address, Duration::from_secs(args.timeout.into()))?;
-    match args.question {
+    match &args.question {
         Question::Status => status(&mut client, console),
         Question::Selftest => selftest(&mut client, console),
-        Question::Rollback => rollback(&mut client, console),
+        Question::Rollback(args) => rollback(args, &mut client, console),
+        Question::Abort(args) => abort(args, &mut client, console),
     }
 }
 
@@ -160,8 +190,82 @@ fn selftest(client: &mut DeviceClient, console: &Console) -> Result<Outcome, Err
     Ok(outcome(is_equal))
 }
 
-fn rollback(client: &mut DeviceClient, console: &Console) -> Result<Outcome, Error> {
-    let stored = client.rollback().map_err(DeviceError::Client)?;
+/// An order of the key's owner to the device as it is now; `None` without a key.
+fn order(
+    action: Action,
+    args: &OrderArgs,
+    client: &mut DeviceClient,
+) -> Result<Option<Order>, Error> {
+    let Some(path) = &args.key else {
+        return Ok(None);
+    };
+    let key = key_file::private(path)?;
+    let status = client.status().map_err(DeviceError::Client)?;
+    let Some(owner) = status.owner else {
+        return Err(DeviceError::Client(ClientError::Refused(Refusal::NoOwner)).into());
+    };
+    let public = key.public().to_bytes();
+    let is_it = |id: &Option<KeyId>| id.is_some_and(|id| public.starts_with(&id));
+    let number = owner.keys.iter().position(is_it).ok_or_else(|| {
+        let found = key.public().to_string().chars().take(16).collect();
+        Error::Usage(UsageError::NotTheOwner { found })
+    })?;
+    let active = status.slots.iter().find_map(|slot| match slot {
+        SlotState::Holds(stored) if status.active_slot == Some(stored.slot) => Some(stored),
+        _ => None,
+    });
+    let (update, checksum) = match action {
+        Action::Rollback => (0, active.map_or(0, |active| active.checksum)),
+        Action::Abort => {
+            let update = status.update;
+            update.map_or((0, 0), |update| (update.number, update.checksum))
+        }
+    };
+    Ok(Some(key.sign_order(&OrderText {
+        action,
+        key: number as u8,
+        serial: status.rig.as_ref().map_or("", |rig| rig.serial.as_str()),
+        sequence: active.map_or(0, |active| active.sequence),
+        update,
+        checksum,
+    })))
+}
+
+fn abort(args: &OrderArgs, client: &mut DeviceClient, console: &Console) -> Result<Outcome, Error> {
+    let status = client.status().map_err(DeviceError::Client)?;
+    match order(Action::Abort, args, client)? {
+        Some(order) => client.order(&order).map(|_| ()),
+        None => client.abort_update(),
+    }
+    .map_err(DeviceError::Client)?;
+    let object = AbortObject {
+        schema: "calib-offline/device-abort/1",
+        was_under_way: status.update.is_some(),
+    };
+    let words = if object.was_under_way {
+        "the update was given up; the blob in use stays"
+    } else {
+        "no update was under way"
+    };
+    console.result(words, &object);
+    Ok(Outcome::Done)
+}
+
+fn rollback(
+    args: &OrderArgs,
+    client: &mut DeviceClient,
+    console: &Console,
+) -> Result<Outcome, Error> {
+    let stored = match order(Action::Rollback, args, client)? {
+        Some(order) => client.order(&order).and_then(|stored| {
+            stored.ok_or(ClientError::BadReply {
+                asked: "rollback",
+                found: "an answer to the end of an update".to_owned(),
+            })
+        }),
+        None => client.rollback(),
+    };
+    let stored = stored.map_err(DeviceError::Client)?;
     let object = RollbackObject {
         schema: "calib-offline/device-rollback/1",
         slot: stored.slot,

@@ -2,16 +2,17 @@
 
 use super::Outcome;
 use super::error::Error;
+use super::key_file;
 use super::output::Console;
 use super::rig_file::{RigFile, open};
+use super::sign::manifest_beside;
 use super::usage_error::UsageError;
 use crate::device::{DeviceError, connect};
-use calib_blob::pack::BlobError;
 use calib_rays::progress::Progress;
 use calib_recording::dataset::identity::hex;
 use clap::Args;
-use firmware_sim::client::{FlashOptions, FlashProgress};
-use ray_device::protocol::Signature;
+use firmware_sim::client::{DeviceClient, FlashOptions, FlashProgress};
+use ray_device::manifest::{Manifest, ManifestBytes};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -28,12 +29,12 @@ off, the blob before stays in use; `calib-offline device rollback` brings it bac
 breaks is opened again, and the transfer goes on where it stopped.
 
 A device that knows its cameras refuses the blob of another rig, and one that knows its serial number
-that of another --rig-serial. A device built for the owner of a key takes only blobs with a signature by it:
-64 bytes, Ed25519, as OpenSSL 3 writes them:
-  openssl pkeyutl -sign -inkey key.pem -rawin -in rig.rays -out rig.rays.sig
+that of another --rig-serial. A device with an owner takes only blobs with a manifest that the owner signed
+(calib-offline sign); without --manifest it is RIG.rays.manifest beside the blob.
 
 With --json, schema calib-offline/flash/1:
   rig, device, slot, sequence, bytes, identity
+  version       of its manifest; null without one
   was_active    true: the device had it in use already and nothing was sent
   resumed       how often a broken transfer went on";
 
@@ -50,9 +51,9 @@ pub struct FlashArgs {
     /// The serial number of the rig that was calibrated
     #[arg(long, value_name = "SERIAL")]
     pub rig_serial: Option<String>,
-    /// The blob's signature, for a device that takes signed blobs only
+    /// The blob's manifest, for a device with an owner: RIG.rays.manifest unless said otherwise
     #[arg(long, value_name = "FILE")]
-    pub signature: Option<PathBuf>,
+    pub manifest: Option<PathBuf>,
     /// How long an answer may take, s: the device erases and checks meanwhile
     #[arg(long, value_name = "SECONDS", default_value_t = 20, value_parser = clap::value_parser!(u16).range(1..=600))]
     pub timeout: u16,
@@ -71,6 +72,7 @@ struct FlashObject<'a> {
     sequence: u32,
     bytes: u32,
     identity: String,
+    version: Option<u32>,
     was_active: bool,
     resumed: u32,
 }
@@ -88,13 +90,17 @@ pub fn run(args: &FlashArgs, console: &Console) -> Result<Outcome, Error> {
     // Before the device is bothered: the file's own fault is told with its name.
     open(&bytes, &args.rig)?;
     let timeout = Duration::from_secs(args.timeout.into());
+    let given = args.manifest.as_deref().map(read_manifest).transpose()?;
+    let mut client = connect(&args.device, timeout)?;
     let options = FlashOptions {
         retries: args.retries,
         timeout,
         rig_serial: args.rig_serial.clone(),
-        signature: args.signature.as_deref().map(read_signature).transpose()?,
+        manifest: match given {
+            None if client.greeting().needs_signature => Some(usual_manifest(args, &mut client)?),
+            given => given,
+        },
     };
-    let mut client = connect(&args.device, timeout)?;
     let mut shown = Shown::new(console.progress());
     let flashed = client.flash(&bytes, &options, &mut |progress| shown.show(progress));
     console.progress().end();
@@ -107,6 +113,7 @@ pub fn run(args: &FlashArgs, console: &Console) -> Result<Outcome, Error> {
         sequence: flashed.stored.sequence,
         bytes: flashed.stored.length,
         identity: hex(&flashed.stored.identity),
+        version: Some(flashed.stored.version).filter(|&version| version > 0),
         was_active: flashed.was_active,
         resumed: flashed.resumed,
     };
@@ -114,16 +121,37 @@ pub fn run(args: &FlashArgs, console: &Console) -> Result<Outcome, Error> {
     Ok(Outcome::Done)
 }
 
-fn read_signature(file: &Path) -> Result<Signature, Error> {
-    let bytes = std::fs::read(file).map_err(|source| BlobError::Read {
-        file: file.to_owned(),
-        source,
-    })?;
-    let signature = Signature::from_bytes(&bytes);
-    signature.ok_or_else(|| {
+/// The manifest beside the blob; without one, what to run.
+fn usual_manifest(args: &FlashArgs, client: &mut DeviceClient) -> Result<ManifestBytes, Error> {
+    let beside = manifest_beside(&args.rig);
+    if beside.exists() {
+        return read_manifest(&beside);
+    }
+    let status = client.status().map_err(DeviceError::Client)?;
+    let newest = status.owner.map_or(0, |owner| owner.claims.newest_version);
+    let serial = status.rig.map(|rig| rig.serial.to_string());
+    let rig = match serial.filter(|serial| !serial.is_empty()) {
+        Some(serial) => format!("--serial {serial:?}"),
+        None => "--any-rig".to_owned(),
+    };
+    Err(Error::Usage(UsageError::NotSigned {
+        rig: args.rig.clone(),
+        command: format!(
+            "calib-offline sign {} --key key.pem --version {} {rig}, with the owner's key, then the same again",
+            args.rig.display(),
+            newest.saturating_add(1)
+        ),
+    }))
+}
+
+fn read_manifest(file: &Path) -> Result<ManifestBytes, Error> {
+    let bytes = key_file::read(file)?;
+    let bytes = bytes.try_into().ok();
+    let manifest = bytes.filter(|bytes: &ManifestBytes| Manifest::parse(bytes).is_ok());
+    manifest.ok_or_else(|| {
         Error::Usage(UsageError::UnknownKind {
             path: file.to_owned(),
-            expected: "an Ed25519 signature: 64 bytes",
+            expected: "a manifest as calib-offline sign writes it: 168 bytes",
         })
     })
 }
@@ -166,13 +194,17 @@ fn in_words(object: &FlashObject<'_>) -> String {
             object.slot
         );
     }
+    let version = match object.version {
+        Some(version) => format!(", version {version},"),
+        None => String::new(),
+    };
     let resumed = match object.resumed {
         0 => String::new(),
         1 => "; the link broke once on the way".to_owned(),
         count => format!("; the link broke {count} times on the way"),
     };
     format!(
-        "{what} is in use on the device, in slot {} as number {}{resumed}",
+        "{what}{version} is in use on the device, in slot {} as number {}{resumed}",
         object.slot, object.sequence
     )
 }

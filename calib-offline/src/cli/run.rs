@@ -7,7 +7,7 @@ use super::output::Console;
 use super::settings::Settings;
 use super::{
     audit, calibrate, compare, demo, device, evaluate, export, failure, flash, import, inspect,
-    measure, methods, pack, rays, recording, target, verify,
+    keygen, measure, methods, pack, rays, recording, sign, target, verify,
 };
 use clap::{Command, CommandFactory as _, FromArgMatches as _};
 use std::process::ExitCode;
@@ -58,10 +58,12 @@ fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
         Verb::Flash(args) => flash::run(args, console),
         Verb::Import(args) => import::run(args, console),
         Verb::Inspect(args) => inspect::run(args, console),
+        Verb::Keygen(args) => keygen::run(args, console),
         Verb::Measure(args) => measure::run(args, console),
         Verb::Methods(args) => methods::run(args, console),
         Verb::Pack(args) => pack::run(args, console),
         Verb::Rays(args) => rays::run(args, console),
+        Verb::Sign(args) => sign::run(args, console),
         Verb::Simulate(args) => recording::simulate(args, console),
         Verb::Target(args) => target::run(args, console),
         Verb::Verify(args) => verify::run(args, console),

@@ -3,6 +3,7 @@
 use crate::pipeline::NoSuchPose;
 use calib_judge::TaskWordsError;
 use calib_rays::remedy::Remedy;
+use firmware_sim::owner::{KeyError, ManifestError};
 use firmware_sim::slot_image::SlotImageError;
 use std::path::PathBuf;
 
@@ -159,6 +160,46 @@ pub enum UsageError {
     /// Images to undistort that nobody named.
     #[error("--format undistort: which images are meant? --images is missing")]
     NoImages,
+    /// A key is never replaced.
+    #[error("{}: exists, and a key is never replaced", path.display())]
+    KeyExists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The system gives no randomness.
+    #[error("the system gives no randomness for a key")]
+    NoRandomness(#[source] std::io::Error),
+    /// A file that holds no key.
+    #[error("{}: {source}", path.display())]
+    Key {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        source: KeyError,
+    },
+    /// Terms that no device could take.
+    #[error("the blob cannot be signed so: {0}")]
+    Manifest(ManifestError),
+    /// A signature that is not by this key, or not of these bytes.
+    #[error("{}: this signature is not by --public-key, or not of what these options say", path.display())]
+    OtherSignature {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A key that the device does not have.
+    #[error("the device has another owner: none of its keys begins with {found}")]
+    NotTheOwner {
+        /// First digits of the public key.
+        found: String,
+    },
+    /// A device with an owner and a blob without a manifest.
+    #[error("the device has an owner and takes signed blobs only, and {} is not signed", rig.display())]
+    NotSigned {
+        /// The blob.
+        rig: PathBuf,
+        /// What to run.
+        command: String,
+    },
     /// The input would be replaced by the output.
     #[error("{}: is what the command reads", path.display())]
     OutputIsInput {
@@ -213,6 +254,20 @@ impl Remedy for UsageError {
             Self::NothingInCommon => "look at both with calib-offline inspect",
             Self::ExportLens { .. } => "take one that it holds; --format opencv holds all of them",
             Self::NoImages => "give the folder of the images with --images FOLDER",
+            Self::KeyExists { .. } => {
+                "choose another name: devices may have been built for that key"
+            }
+            Self::NoRandomness(_) => {
+                "make the key elsewhere, such as with openssl genpkey -algorithm ed25519"
+            }
+            Self::Key { .. } | Self::Manifest(_) => return None,
+            Self::OtherSignature { .. } => {
+                "repeat all options that --to-be-signed was given, and sign that very file"
+            }
+            Self::NotTheOwner { .. } => {
+                "calib-offline device status shows the first digits of its keys"
+            }
+            Self::NotSigned { command, .. } => return Some(command.clone()),
             Self::OutputIsInput { .. } => "choose another place with -o",
         };
         Some(text.to_owned())

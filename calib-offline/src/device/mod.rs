@@ -7,7 +7,7 @@ mod state;
 mod words;
 
 pub use points::{DeviceSource, on_wire};
-pub use state::{BlobState, DeviceState, SlotState};
+pub use state::{BlobState, DeviceState, OwnerState, SlotState};
 pub use words::state_in_words;
 
 use calib_rays::remedy::Remedy;

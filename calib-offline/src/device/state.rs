@@ -38,6 +38,21 @@ pub struct DeviceState {
     pub gaps: Option<GapState>,
     /// What it computes points in: f32 or integer.
     pub arithmetic: &'static str,
+    /// Whose it is; `None`: anybody may change it.
+    pub owner: Option<OwnerState>,
+}
+
+/// Whose a device is, and what it has seen signed.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct OwnerState {
+    /// The first digits of its public keys, by number.
+    pub keys: [Option<String>; 2],
+    /// The highest version that was ever in use.
+    pub newest_version: u32,
+    /// No lower version is used.
+    pub least_version: u32,
+    /// Keys with a lower number are retired.
+    pub retired_below: u32,
 }
 
 /// The blob in use.
@@ -84,12 +99,14 @@ pub enum SlotState {
         checksum: String,
         /// Hash of the calibration it was packed from.
         identity: String,
+        /// Of its manifest, on a device with an owner.
+        version: Option<u32>,
     },
     /// A blob that was whole once.
     Unusable {
         /// Of its commit record.
         sequence: u32,
-        /// The runtime's code of why.
+        /// The runtime's code of why, or the device's own.
         open_error: u8,
     },
 }
@@ -162,6 +179,12 @@ impl DeviceState {
                 verdict: verdict_word(report.verdict()),
                 report,
             }),
+            owner: status.owner.map(|owner| OwnerState {
+                keys: owner.keys.map(|id| id.map(|id| hex(&id))),
+                newest_version: owner.claims.newest_version,
+                least_version: owner.claims.least_version,
+                retired_below: owner.claims.least_key,
+            }),
         }
     }
 
@@ -191,6 +214,7 @@ fn slot_state(slot: &protocol::SlotState, status: &Status) -> SlotState {
             bytes: stored.length,
             checksum: format!("{:08x}", stored.checksum),
             identity: hex(&stored.identity),
+            version: status.owner.map(|_| stored.version),
         },
         protocol::SlotState::Unusable {
             sequence,

@@ -1,6 +1,7 @@
 //! A device's state for people.
 
-use super::state::{CameraState, DeviceState, SlotState};
+use super::state::{CameraState, DeviceState, OwnerState, SlotState};
+use ray_device::storage::trust::Distrust;
 
 /// What the device is, what it holds, and whether its calibration still fits: a few lines.
 pub fn state_in_words(state: &DeviceState) -> String {
@@ -29,6 +30,9 @@ pub fn state_in_words(state: &DeviceState) -> String {
             "measures nothing: {}",
             match code {
                 Some(2) | None => "its flash holds no blob; send one with calib-offline flash".to_owned(),
+                Some(code) if let Some(reason) = Distrust::from_code(code) => {
+                    format!("the blob in its flash is not used: {reason} (code {code})")
+                }
                 Some(code) => format!(
                     "the blob in its flash cannot be opened (code {code}); send one with calib-offline flash"
                 ),
@@ -57,6 +61,9 @@ pub fn state_in_words(state: &DeviceState) -> String {
             cameras(&rig.cameras)
         ));
     }
+    if let Some(owner) = &state.owner {
+        lines.push(owner_in_words(owner));
+    }
     lines.push(match &state.gaps {
         Some(gaps) => gaps.report.to_string(),
         None => "whether the calibration still fits is not known yet: nothing was measured since it started"
@@ -74,9 +81,14 @@ fn slot_in_words(slot: &SlotState) -> String {
             sequence,
             bytes,
             identity,
+            version,
             ..
         } => format!(
-            "blob {identity} ({bytes} bytes), number {sequence}{}",
+            "blob {identity} ({bytes} bytes), number {sequence}{}{}",
+            match version {
+                Some(version) => format!(", version {version}"),
+                None => String::new(),
+            },
             if *is_active {
                 ", in use"
             } else {
@@ -86,8 +98,32 @@ fn slot_in_words(slot: &SlotState) -> String {
         SlotState::Unusable {
             sequence,
             open_error,
-        } => format!("what was number {sequence} is damaged (code {open_error})"),
+        } => match Distrust::from_code(*open_error) {
+            Some(reason) => {
+                format!("blob number {sequence} is not used: {reason} (code {open_error})")
+            }
+            None => format!("what was number {sequence} is damaged (code {open_error})"),
+        },
     }
+}
+
+fn owner_in_words(owner: &OwnerState) -> String {
+    let keys = (0..).zip(&owner.keys).filter_map(|(number, key)| {
+        let is_retired = number < owner.retired_below;
+        let retired = if is_retired { " (retired)" } else { "" };
+        key.as_ref()
+            .map(|key| format!("key {number} {key}...{retired}"))
+    });
+    let keys = keys.collect::<Vec<_>>().join(", ");
+    let versions = match owner.newest_version {
+        0 => "nothing signed has been in use yet".to_owned(),
+        newest => format!(
+            "takes versions from {} on, goes back to {} at most",
+            newest.saturating_add(1),
+            owner.least_version.max(1)
+        ),
+    };
+    format!("changed by its owner only: {keys}; {versions}")
 }
 
 fn cameras(cameras: &[CameraState]) -> String {
@@ -145,6 +181,7 @@ mod tests {
             update: None,
             rig: None,
             gaps: None,
+            owner: None,
         }
     }
 
@@ -156,6 +193,7 @@ mod tests {
             bytes: 48320,
             checksum: "0badcafe".to_owned(),
             identity: "9f2c4e".to_owned(),
+            version: None,
         };
         let measuring = DeviceState {
             blob: Some(BlobState {
@@ -202,7 +240,34 @@ mod tests {
             ],
             ..empty()
         };
-        let states = [empty(), measuring, damaged];
+        let owned = DeviceState {
+            open_error: Some(160),
+            slots: [
+                SlotState::Unusable {
+                    sequence: 4,
+                    open_error: 160,
+                },
+                SlotState::Holds {
+                    is_active: false,
+                    sequence: 3,
+                    bytes: 48320,
+                    checksum: "0badcafe".to_owned(),
+                    identity: "9f2c4e".to_owned(),
+                    version: Some(7),
+                },
+            ],
+            owner: Some(OwnerState {
+                keys: [
+                    Some("3d4017c3e843895a".to_owned()),
+                    Some("fc51cd8e6218a1a3".to_owned()),
+                ],
+                newest_version: 7,
+                least_version: 5,
+                retired_below: 1,
+            }),
+            ..empty()
+        };
+        let states = [empty(), measuring, damaged, owned];
         let text = states.map(|state| state_in_words(&state));
         assert_snapshot("device_state", &text.join("\n\n"));
     }

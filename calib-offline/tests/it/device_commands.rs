@@ -2,9 +2,7 @@
 //! simulated device.
 
 use crate::common::{Run, contents, run};
-use firmware_sim::simulated::flash_file;
 use firmware_sim::simulated::host::SimulatedDevice;
-use ray_device::storage::trust::{PublicKey, Trust};
 use ray_runtime::{Aligned, PixelPoint, RayBlob};
 use std::fmt::Write as _;
 use std::fs;
@@ -248,29 +246,4 @@ fn what_cannot_be_done_is_said_and_nothing_is_written() {
     ask(path, &address, "status")
         .assert_code(0)
         .assert_prints(&["up for", "0 updates"]);
-}
-
-#[test]
-fn a_device_with_an_owner_takes_no_unsigned_blob() {
-    let folder = folder();
-    let path = folder.path();
-    let any_port = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-    let key =
-        PublicKey::from_hex("3d4017c3e843895a92b70aa74d1b7ebc9c982ccf2ec4968cc0cd55f12af4660c");
-    let flash = flash_file::blank(None).unwrap();
-    let trust = Trust::Signed(key.unwrap());
-    let device = SimulatedDevice::start_trusting(any_port, flash, trust).unwrap();
-    let owned = format!("tcp:{}", device.address());
-    fs::write(path.join("zeros.sig"), [0; 64]).unwrap();
-    let flash = ["flash", "small.rays", "--device", &owned];
-    run(path, &flash)
-        .assert_code(2)
-        .assert_says(&["takes signed blobs only", "--signature"]);
-    let with = |file| [&flash[..], &["--signature", file]].concat();
-    run(path, &with("fast.rays"))
-        .assert_code(2)
-        .assert_says(&["fast.rays: is not an Ed25519 signature: 64 bytes"]);
-    run(path, &with("zeros.sig"))
-        .assert_code(2)
-        .assert_says(&["the signature is not of this blob"]);
 }

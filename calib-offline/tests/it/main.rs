@@ -29,6 +29,7 @@ mod point_sigma;
 mod printed_targets;
 mod rays_command;
 mod schemas;
+mod signing;
 mod starting_points;
 mod target_command;
 mod uncertainty;

@@ -163,6 +163,7 @@ fn of_devices() {
     let device = |verb: &str| json(path, &[&["device", verb], &there[..]].concat());
     let owned = "a device that was built with its cameras";
     let under_way = "a transfer that was broken off";
+    let signed = "a device with an owner";
     assert_documented(
         "device",
         "calib-offline/device-status/1",
@@ -177,6 +178,10 @@ fn of_devices() {
             ("update.identity", under_way),
             ("update.bytes", under_way),
             ("update.received_bytes", under_way),
+            ("owner.keys", signed),
+            ("owner.newest_version", signed),
+            ("owner.least_version", signed),
+            ("owner.retired_below", signed),
         ],
     );
     let tested = device("selftest");

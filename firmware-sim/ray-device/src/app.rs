@@ -12,6 +12,7 @@
 //! }
 //! ```
 
+mod changes;
 #[cfg(feature = "integer")]
 mod integers;
 mod self_test;
@@ -20,19 +21,20 @@ use heapless::Vec;
 use ray_runtime::{MatchNoise, MeasureError, OpenError, PixelPoint, RayBlob};
 
 use crate::health::Health;
+use crate::manifest::MANIFEST_LENGTH;
 use crate::port::{Clock, Regions};
 use crate::protocol::{
-    Arithmetic, BlobStatus, CameraStatus, Chunk, Hello, MAX_CHUNK, MAX_MATCHES, Match, Measured,
-    NewBlob, Point, Refusal, Reply, Request, Rig, SlotState, Status, StoredBlob, name,
+    Arithmetic, BlobStatus, CameraStatus, Hello, MAX_CHUNK, MAX_MATCHES, Match, Measured,
+    OwnerStatus, Point, Refusal, Reply, Request, Rig, SlotState, Status, StoredBlob, name,
 };
 use crate::session::Responder;
+use crate::storage;
+use crate::storage::budget::Budget;
 use crate::storage::factory::Factory;
-use crate::storage::log::Log;
-use crate::storage::record::{Claims, Record};
+use crate::storage::record::Record;
 use crate::storage::slot::SlotFlash;
-use crate::storage::transfer::{Owner, Peer, Transfer};
-use crate::storage::trust::Trust;
-use crate::storage::{self, rig};
+use crate::storage::transfer::{Peer, Transfer};
+use crate::storage::trust::{Claims, Trust};
 
 /// Version of the application, as [`Hello`] gives it.
 pub const FIRMWARE_VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -45,6 +47,9 @@ pub struct Device<C> {
     trust: Trust,
     arithmetic: Arithmetic,
     transfer: Option<Transfer>,
+    budget: Budget,
+    /// Updates begun.
+    begun: u32,
     /// Of what this epoch's blob measured.
     health: Health,
     answered: u32,
@@ -62,6 +67,8 @@ impl<C: Clock> Device<C> {
             trust: Trust::Anybody,
             arithmetic: Arithmetic::Float,
             transfer: None,
+            budget: Budget::default(),
+            begun: 0,
             health: Health::new(),
             answered: 0,
             refused: 0,
@@ -70,7 +77,8 @@ impl<C: Clock> Device<C> {
         }
     }
 
-    /// The same device, taking only blobs that this trust allows. What is in its slots stays there.
+    /// The same device, which only those change whom this trusts. What is in its slots stays there; with an
+    /// owner it is in use only if the owner signed it.
     #[must_use]
     pub fn taking(mut self, trust: Trust) -> Self {
         self.trust = trust;
@@ -95,13 +103,13 @@ impl<C: Clock> Device<C> {
         regions: &'e mut Regions<S, F>,
     ) -> Epoch<'e, S, C> {
         self.health = Health::new();
-        let booted = storage::boot(regions, &mut self.clock);
         let rig = regions.factory.rig();
+        let booted = storage::boot(regions, self.trust, rig.as_ref(), &mut self.clock);
         let Regions {
             factory,
             slots: [slot_0, slot_1],
         } = regions;
-        let factory = factory.blob();
+        let factory = storage::usable_factory(factory.blob(), self.trust, booted.claims);
         let [record_0, record_1] = booted.records;
         let sequence = |record: Option<Record>| record.map_or(0, |record| record.sequence);
         let is_0_older = sequence(record_0) <= sequence(record_1);
@@ -193,8 +201,9 @@ impl<'e, S: SlotFlash, C: Clock> Epoch<'e, S, C> {
             Request::BeginUpdate(new) => self.begin_update(peer, new),
             Request::Chunk(chunk) => self.store(peer, chunk),
             Request::FinishUpdate => self.finish_update(peer),
-            Request::AbortUpdate => self.abort_update(peer),
-            Request::Rollback => self.rollback(peer),
+            Request::AbortUpdate => self.asked_to_abort(peer),
+            Request::Rollback => self.asked_to_roll_back(peer),
+            Request::Order(order) => self.ordered(order),
             Request::SelfTest => self.self_test(),
             Request::MeasureNoisy(asked) => match MatchNoise::from_px(asked.noise_px) {
                 Some(noise) => self.measure(&asked.matches, Asked::Sigmas(Some(noise))),
@@ -214,13 +223,22 @@ impl<'e, S: SlotFlash, C: Clock> Epoch<'e, S, C> {
         }
     }
 
+    /// Bytes that a slot keeps for a manifest.
+    fn manifest_length(&self) -> u32 {
+        if self.device.trust.needs_signature() {
+            MANIFEST_LENGTH as u32
+        } else {
+            0
+        }
+    }
+
     fn hello(&self) -> Hello {
         Hello {
             device: name(self.device.kind),
             firmware: name(FIRMWARE_VERSION),
             max_matches: MAX_MATCHES as u8,
             max_chunk: MAX_CHUNK as u16,
-            max_blob: self.inactive.max_blob(0),
+            max_blob: self.inactive.max_blob(self.manifest_length()),
             unit: self.inactive.shape().blob.line() as u16,
             needs_signature: self.device.trust.needs_signature(),
         }
@@ -229,8 +247,11 @@ impl<'e, S: SlotFlash, C: Clock> Epoch<'e, S, C> {
     #[inline(never)]
     fn status(&mut self) -> Status {
         let mut slots = self.slots;
-        let update = self.device.transfer.as_ref().map(Transfer::status);
-        if let (Some(_), Some(slot)) = (&update, slots.get_mut(self.inactive_index)) {
+        let transfer = self.device.transfer.as_ref();
+        let update = transfer.map(Transfer::status);
+        if transfer.is_some_and(Transfer::has_stored)
+            && let Some(slot) = slots.get_mut(self.inactive_index)
+        {
             *slot = SlotState::Receiving;
         }
         Status {
@@ -241,12 +262,16 @@ impl<'e, S: SlotFlash, C: Clock> Epoch<'e, S, C> {
             active_slot: self.active.map(|stored| stored.slot),
             slots,
             update,
-            max_blob: self.inactive.max_blob(0),
+            max_blob: self.inactive.max_blob(self.manifest_length()),
             updates: self.device.updates,
             rollbacks: self.device.rollbacks,
             rig: self.rig.clone(),
             gaps: self.device.health.report(),
             arithmetic: self.device.arithmetic,
+            owner: self.device.trust.keys().map(|keys| OwnerStatus {
+                keys: keys.ids(),
+                claims: self.claims,
+            }),
         }
     }
 
@@ -274,137 +299,6 @@ impl<'e, S: SlotFlash, C: Clock> Epoch<'e, S, C> {
             return Ok(Reply::SelfTested(integers::report(integers, blob)));
         }
         Ok(Reply::SelfTested(self_test::report(blob)))
-    }
-
-    #[inline(never)]
-    fn begin_update(&mut self, peer: Peer, new: &NewBlob) -> Result<Reply, Refusal> {
-        let now_ms = self.device.clock.uptime_ms();
-        if let Some(transfer) = &mut self.device.transfer {
-            if transfer.is_of(new) {
-                let received = transfer.resume(peer, now_ms);
-                return Ok(Reply::Receiving { received });
-            }
-            transfer.make_way(peer, now_ms)?;
-        }
-        self.device.transfer = None;
-        if let Some(active) = self.active
-            && active.length == new.length
-            && active.checksum == new.checksum
-            && active.identity == new.identity
-        {
-            return Ok(Reply::Active(active));
-        }
-        let owner = Owner {
-            rig: self.rig.as_ref(),
-            trust: self.device.trust,
-        };
-        let begun = Transfer::begin(self.inactive, new, peer, &owner, &mut self.device.clock);
-        if matches!(begun, Ok(_) | Err(Refusal::FlashFailed { .. }))
-            && let Some(slot) = self.slots.get_mut(self.inactive_index)
-        {
-            *slot = SlotState::Empty;
-        }
-        self.device.transfer = Some(begun?);
-        Ok(Reply::Receiving { received: 0 })
-    }
-
-    #[inline(never)]
-    fn store(&mut self, peer: Peer, chunk: &Chunk) -> Result<Reply, Refusal> {
-        let transfer = self.device.transfer.as_mut().ok_or(Refusal::NoUpdate)?;
-        transfer.check_peer(peer)?;
-        let outcome = transfer.store(self.inactive, chunk, &mut self.device.clock);
-        if let Err(Refusal::FlashFailed { .. }) = outcome {
-            // Part of it may be programmed, and cannot be once more: only a new start helps.
-            self.device.transfer = None;
-        }
-        Ok(Reply::Receiving { received: outcome? })
-    }
-
-    #[inline(never)]
-    fn finish_update(&mut self, peer: Peer) -> Result<Reply, Refusal> {
-        let transfer = self.device.transfer.as_ref().ok_or(Refusal::NoUpdate)?;
-        transfer.check_peer(peer)?;
-        let identity = transfer.status().identity;
-        let owner = Owner {
-            rig: self.rig.as_ref(),
-            trust: self.device.trust,
-        };
-        let outcome = transfer.check(self.inactive, &owner, &mut self.device.clock);
-        if let Err(refusal @ Refusal::Incomplete { .. }) = outcome {
-            return Err(refusal);
-        }
-        self.device.transfer = None;
-        let checked = outcome?;
-        let sequence = checked.commit(
-            self.inactive,
-            self.next_sequence,
-            self.claims,
-            &mut self.device.clock,
-        )?;
-        self.device.updates = self.device.updates.saturating_add(1);
-        self.is_over = true;
-        Ok(Reply::Active(StoredBlob {
-            slot: self.inactive_index as u8,
-            sequence,
-            length: checked.length,
-            checksum: checked.checksum,
-            identity,
-        }))
-    }
-
-    fn abort_update(&mut self, peer: Peer) -> Result<Reply, Refusal> {
-        if let Some(transfer) = &self.device.transfer {
-            transfer.make_way(peer, self.device.clock.uptime_ms())?;
-        }
-        self.device.transfer = None;
-        Ok(Reply::Aborted)
-    }
-
-    #[inline(never)]
-    fn rollback(&mut self, peer: Peer) -> Result<Reply, Refusal> {
-        if let Some(transfer) = &self.device.transfer {
-            transfer.make_way(peer, self.device.clock.uptime_ms())?;
-        }
-        let state = self.slots.get(self.inactive_index).copied();
-        let (stored, record) = match (state, self.inactive_record) {
-            (Some(SlotState::Holds(stored)), Some(record)) => (stored, record),
-            // Nothing else is there.
-            _ => (self.factory_to_roll_back_to()?, Record::default()),
-        };
-        let sequence = self.next_sequence.ok_or(Refusal::LogFull)?;
-        let record = Record {
-            sequence,
-            claims: self.claims,
-            ..record
-        };
-        // It was whole when the device started; bits may have flipped since.
-        let clock = &mut self.device.clock;
-        let is_whole = record.length == 0 || storage::verify(self.inactive, &record, clock).is_ok();
-        let blob = storage::open_of(&*self.inactive, self.factory, &record)
-            .ok()
-            .filter(|_| is_whole)
-            .ok_or(Refusal::NothingToRollBackTo)?;
-        if let Some(own) = &self.rig {
-            rig::compare(&blob, own)?;
-        }
-        Log::commit(self.inactive, &record, clock)?;
-        self.device.rollbacks = self.device.rollbacks.saturating_add(1);
-        self.is_over = true;
-        Ok(Reply::Active(StoredBlob { sequence, ..stored }))
-    }
-}
-
-impl<S: SlotFlash, C: Clock> Epoch<'_, S, C> {
-    /// The factory's blob, unless it is in use.
-    fn factory_to_roll_back_to(&self) -> Result<StoredBlob, Refusal> {
-        let stored = storage::factory_blob(self.factory).ok_or(Refusal::NothingToRollBackTo)?;
-        match self.active {
-            Some(active) if active.checksum != stored.checksum => Ok(StoredBlob {
-                slot: self.inactive_index as u8,
-                ..stored
-            }),
-            _ => Err(Refusal::NothingToRollBackTo),
-        }
     }
 }
 

@@ -8,6 +8,7 @@ pub mod frame;
 pub mod health;
 #[cfg(feature = "embedded-io")]
 pub mod io_link;
+pub mod manifest;
 pub mod port;
 pub mod protocol;
 pub mod session;

@@ -15,6 +15,8 @@ use ray_runtime::{Measurement, Triangulation};
 use serde::{Deserialize, Serialize};
 
 use crate::health::GapReport;
+use crate::manifest::{Action, Link, MANIFEST_LENGTH, MAX_KEYS};
+use crate::storage::trust::{Claims, KeyId};
 
 pub use refusal::{FlashOperation, Refusal, RigPart};
 
@@ -57,7 +59,10 @@ pub enum Request {
     ///
     /// If this very blob is under way, from whichever peer, its transfer goes on where it stopped:
     /// the answer says how much has arrived. Any other transfer of the same peer is given up, and
-    /// that of another peer once it has been silent for a while.
+    /// that of another peer once no chunk of it has been stored for a while. On a device with an owner the
+    /// peer does not matter: a newer version takes over at once, an older one once the newer is silent.
+    ///
+    /// Nothing is erased before the first chunk was accepted.
     BeginUpdate(NewBlob),
     /// The next bytes of the new blob. Answered by [`Reply::Receiving`].
     ///
@@ -66,9 +71,11 @@ pub enum Request {
     Chunk(Chunk),
     /// All bytes were sent: check the new blob and make it active. Answered by [`Reply::Active`].
     FinishUpdate,
-    /// Give the transfer up. Answered by [`Reply::Aborted`], also if there is none.
+    /// Give the transfer up. Answered by [`Reply::Aborted`], also if there is none; a device with an owner
+    /// refuses it and takes a [`Request::Order`].
     AbortUpdate,
-    /// Make the other slot's blob active, after a check of all of it. Answered by [`Reply::Active`].
+    /// Make the other slot's blob active, after a check of all of it. Answered by [`Reply::Active`]; a device
+    /// with an owner refuses it and takes a [`Request::Order`].
     Rollback,
     /// Compare the active blob's self-tests. Answered by [`Reply::SelfTested`].
     SelfTest,
@@ -78,6 +85,9 @@ pub enum Request {
     /// Triangulate these without their standard deviations, which take four times as long as the points. Answered by
     /// [`Reply::Measured`]; such points do not count into [`Status::gaps`].
     MeasurePoints(Vec<Match, MAX_MATCHES>),
+    /// What the owner of the device orders, such as a rollback. Answered as the same without an order. A
+    /// device without an owner refuses it.
+    Order(Order),
 }
 
 /// What a device answers.
@@ -117,13 +127,28 @@ pub struct NewBlob {
     /// Its identity, which must be the one that it states itself.
     pub identity: [u8; IDENTITY_LENGTH],
     /// Serial number of the rig it was calibrated on, if known: a device that knows its own takes
-    /// no other.
+    /// no other. One with an owner goes by the manifest instead.
     pub rig_serial: Option<Name>,
-    /// Who made it, if anybody signed it: [`Hello::needs_signature`] says whether it must be.
-    pub signature: Option<Signature>,
+    /// The [`Manifest`](crate::manifest::Manifest) of its owner, empty without one:
+    /// [`Hello::needs_signature`] says whether there must be one. Stored with the blob, asked for or not.
+    pub manifest: Vec<u8, MANIFEST_LENGTH>,
 }
 
-/// An Ed25519 signature (RFC 8032) of all bytes of a blob.
+/// What the owner of a device orders: the signature is of an [`OrderText`](crate::manifest::OrderText).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Order {
+    /// What is to be done.
+    pub action: Action,
+    /// Number of the key that signed it.
+    pub key: u8,
+    /// Sequence number of the blob that was active when it was signed; 0 if there was none.
+    pub sequence: u32,
+    /// Of the order's text.
+    pub signature: Signature,
+}
+
+/// An Ed25519 signature (RFC 8032).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Signature {
@@ -150,8 +175,11 @@ impl Signature {
 pub struct Chunk {
     /// Where in the blob it starts.
     pub offset: u32,
-    /// A multiple of [`Hello::unit`] bytes, unless it is the last: whole units are programmed as chunks come.
+    /// A multiple of [`Hello::unit`] bytes, unless it is the last: whole units are programmed as chunks come. On a
+    /// device with an owner, [`MAX_CHUNK`] bytes, unless it is the last.
     pub bytes: Vec<u8, MAX_CHUNK>,
+    /// Link of the next piece in the chain of the [manifest](crate::manifest), on a device with an owner.
+    pub next: Option<Link>,
 }
 
 /// A blob in a slot, with a valid commit record.
@@ -168,6 +196,8 @@ pub struct StoredBlob {
     pub checksum: u32,
     /// Hash of the calibration it was packed from.
     pub identity: [u8; IDENTITY_LENGTH],
+    /// Of its manifest, as a device with an owner has verified it; 0 on others.
+    pub version: u32,
 }
 
 /// What the self-tests of the active blob gave on this device.
@@ -296,7 +326,7 @@ pub struct Hello {
     pub max_blob: u32,
     /// What its flash programs in one go, bytes: a power of two from 8 to [`MAX_CHUNK`].
     pub unit: u16,
-    /// Whether it takes signed blobs only.
+    /// Whether it has an owner, and so takes signed blobs only.
     pub needs_signature: bool,
 }
 
@@ -331,16 +361,29 @@ pub struct Status {
     pub gaps: Option<GapReport>,
     /// What it computes points in.
     pub arithmetic: Arithmetic,
+    /// Whose it is; `None`: anybody may change it.
+    pub owner: Option<OwnerStatus>,
 }
 
 /// What a device computes rays and points in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Arithmetic {
     /// Numbers of f32.
     #[default]
     Float,
     /// Integers. Its points have no standard deviations, and do not count into [`Status::gaps`].
     Integer,
+}
+
+/// What a device with an owner tells of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct OwnerStatus {
+    /// The first bytes of its public keys.
+    pub keys: [Option<KeyId>; MAX_KEYS],
+    /// What it has seen signed.
+    pub claims: Claims,
 }
 
 /// What a slot holds.
@@ -357,7 +400,8 @@ pub enum SlotState {
     Unusable {
         /// Of its commit record.
         sequence: u32,
-        /// The stable code of the runtime's `OpenError`.
+        /// The stable code of the runtime's `OpenError`, or of the device's own: [`OTHER_PART`](crate::storage::OTHER_PART)
+        /// or that of a [`Distrust`](crate::storage::trust::Distrust).
         open_error: u8,
     },
 }
@@ -372,6 +416,10 @@ pub struct UpdateStatus {
     pub received: u32,
     /// Its identity, as announced.
     pub identity: [u8; IDENTITY_LENGTH],
+    /// Its checksum, as announced.
+    pub checksum: u32,
+    /// Updates begun since the device started, this one included.
+    pub number: u32,
 }
 
 /// What a device knows of the cameras it is built with, from its factory record.

@@ -121,6 +121,7 @@
 //! ```
 
 pub mod access;
+pub mod budget;
 pub mod factory;
 pub mod layout;
 pub mod log;
@@ -132,14 +133,16 @@ pub mod trust;
 
 use ray_runtime::{OpenError, RayBlob};
 
+use crate::manifest::Manifest;
 use crate::port::{Clock, Flash, Geometry, MappedFlash, Regions};
-use crate::protocol::{Refusal, SlotState, StoredBlob};
+use crate::protocol::{Refusal, Rig, SlotState, StoredBlob};
 use access::{checksum, erase, program};
 use factory::{FACTORY_SLOT, Factory};
 use layout::aligned;
 use log::{Log, erase_log};
 use record::{Claims, Record};
 use slot::SlotFlash;
+use trust::{Distrust, Trust};
 
 /// Refuses, at compile time, flash that the storage cannot work with.
 #[inline]
@@ -172,7 +175,7 @@ pub struct Booted {
     pub slots: [SlotState; 2],
     /// The records that say so.
     pub records: [Option<Record>; 2],
-    /// The claims of the newest record, whatever became of its blob.
+    /// What both records claim together, whatever became of their blobs, and the manifests in use.
     pub claims: Claims,
     /// The stable code of the runtime's `OpenError` for why no slot can be used, or [`OTHER_PART`].
     pub open_error: u8,
@@ -184,12 +187,14 @@ pub struct Booted {
 pub const OTHER_PART: u8 = 128;
 
 /// Decides which slot is active, and writes the decision down wherever the flash might say something
-/// else the next time.
+/// else the next time. A device with an owner uses only what its owner signed, for this rig.
 ///
 /// It never fails: flash that cannot be written leaves the decision as it is.
 #[inline(never)]
 pub fn boot<S: SlotFlash, F: Factory, C: Clock>(
     regions: &mut Regions<S, F>,
+    trust: Trust,
+    rig: Option<&Rig>,
     clock: &mut C,
 ) -> Booted {
     require_supported::<S::Log>();
@@ -198,12 +203,23 @@ pub fn boot<S: SlotFlash, F: Factory, C: Clock>(
         factory,
         slots: [slot_0, slot_1],
     } = regions;
-    let factory = factory.blob();
     let logs = [settle(slot_0, clock), settle(slot_1, clock)];
     let mut records = logs.map(|log| log.record());
+    let known = logs.map(|log| {
+        log.record()
+            .map_or(Claims::default(), |record| record.claims)
+    });
+    let known = known[0].joined(known[1]);
+    let judge = Judge { trust, rig };
+    let [(state_0, claims_0), (state_1, claims_1)] = [
+        inspect(0, slot_0, &logs[0], judge, known, factory.blob(), clock),
+        inspect(1, slot_1, &logs[1], judge, known, factory.blob(), clock),
+    ];
+    let claims = claims_0.joined(claims_1);
+    let factory = usable_factory(factory.blob(), trust, claims);
     let mut slots = [
-        inspect(0, slot_0, &logs[0], factory, clock),
-        inspect(1, slot_1, &logs[1], factory, clock),
+        judge.once_more(state_0, slot_0, records[0], claims),
+        judge.once_more(state_1, slot_1, records[1], claims),
     ];
     let newest = match records {
         [Some(a), Some(b)] if b.sequence > a.sequence => Some(b),
@@ -238,7 +254,7 @@ pub fn boot<S: SlotFlash, F: Factory, C: Clock>(
         };
         let again = Record {
             sequence: next,
-            claims: newest.claims,
+            claims,
             ..again
         };
         if Log::read(region, clock)
@@ -260,7 +276,7 @@ pub fn boot<S: SlotFlash, F: Factory, C: Clock>(
         active: active.map(|(slot, _)| slot),
         slots,
         records,
-        claims: newest.claims,
+        claims,
         open_error: open_error(slots),
         next_sequence,
     }
@@ -293,7 +309,14 @@ pub fn factory_blob(factory: Option<&[u8]>) -> Option<StoredBlob> {
         length: bytes.len() as u32,
         checksum: crate::frame::checksum(bytes),
         identity: *blob.identity(),
+        version: 0,
     })
+}
+
+/// The factory's blob, if the owner has not ruled it out: it came with the device, as its firmware did, and counts
+/// as version 0.
+pub fn usable_factory(factory: Option<&[u8]>, trust: Trust, claims: Claims) -> Option<&[u8]> {
+    factory.filter(|_| !trust.needs_signature() || claims.check_factory().is_ok())
 }
 
 /// The blobs that can be used.
@@ -322,48 +345,128 @@ fn settle<S: SlotFlash, C: Clock>(slot: &mut S, clock: &mut C) -> Log {
     log
 }
 
-/// What a slot holds, by its log.
+/// Who says what may be used.
+#[derive(Clone, Copy)]
+struct Judge<'a> {
+    trust: Trust,
+    rig: Option<&'a Rig>,
+}
+
+impl Judge<'_> {
+    /// The same state, or that it may not be used after all, now that the other slot's manifest is known, too.
+    fn once_more<S: SlotFlash>(
+        self,
+        state: SlotState,
+        slot: &S,
+        record: Option<Record>,
+        claims: Claims,
+    ) -> SlotState {
+        let (Some(_), SlotState::Holds(stored), Some(record)) = (self.trust.keys(), state, record)
+        else {
+            return state;
+        };
+        let checked = if record.length == 0 {
+            claims.check_factory()
+        } else {
+            trust::read(manifest_bytes(slot, &record))
+                .and_then(|(manifest, _)| claims.check_use(&manifest))
+        };
+        match checked {
+            Ok(()) => state,
+            Err(refusal) => SlotState::Unusable {
+                sequence: stored.sequence,
+                open_error: Distrust::of(refusal).code(),
+            },
+        }
+    }
+}
+
+/// What a slot holds, by its log, and what the device claims with it.
 #[inline(never)]
 fn inspect<S: SlotFlash, C: Clock>(
     index: u8,
     slot: &mut S,
     log: &Log,
+    judge: Judge<'_>,
+    claims: Claims,
     factory: Option<&[u8]>,
     clock: &mut C,
-) -> SlotState {
+) -> (SlotState, Claims) {
     let Some(record) = log.record() else {
-        return SlotState::Empty;
+        return (SlotState::Empty, claims);
     };
-    let unusable = |open_error| SlotState::Unusable {
-        sequence: record.sequence,
-        open_error,
+    let unusable = |open_error| {
+        let sequence = record.sequence;
+        (
+            SlotState::Unusable {
+                sequence,
+                open_error,
+            },
+            claims,
+        )
     };
     if !log.is_of_this_part() {
         return unusable(OTHER_PART);
     }
     if record.length == 0 {
         return match factory_blob(factory) {
-            Some(stored) => SlotState::Holds(StoredBlob {
-                slot: index,
-                sequence: record.sequence,
-                ..stored
-            }),
+            Some(stored) => {
+                let stored = StoredBlob {
+                    slot: index,
+                    sequence: record.sequence,
+                    ..stored
+                };
+                (SlotState::Holds(stored), claims)
+            }
             None => unusable(NO_BLOB.code()),
         };
     }
     if let Err(error) = verify(slot, &record, clock) {
         return unusable(error.code());
     }
-    match open_verified(slot, &record) {
-        Ok(blob) => SlotState::Holds(StoredBlob {
-            slot: index,
-            sequence: record.sequence,
-            length: record.length,
-            checksum: record.checksum,
-            identity: *blob.identity(),
-        }),
-        Err(error) => unusable(error.code()),
+    let identity = match open_verified(slot, &record) {
+        Ok(blob) => *blob.identity(),
+        Err(error) => return unusable(error.code()),
+    };
+    let (version, claims) = match trusted(slot, &record, judge.trust, judge.rig, claims, clock) {
+        Ok(Some(manifest)) => (manifest.version, claims.after(&manifest)),
+        Ok(None) => (0, claims),
+        Err(refusal) => return unusable(Distrust::of(refusal).code()),
+    };
+    let stored = StoredBlob {
+        slot: index,
+        sequence: record.sequence,
+        length: record.length,
+        checksum: record.checksum,
+        identity,
+        version,
+    };
+    (SlotState::Holds(stored), claims)
+}
+
+/// The manifest of a record that [`verify`] found good, if the device has an owner, who then must have signed it.
+///
+/// # Errors
+/// Those of [`Keys::check_stored`](trust::Keys::check_stored).
+#[inline(never)]
+pub fn trusted<S: SlotFlash, C: Clock>(
+    slot: &S,
+    record: &Record,
+    trust: Trust,
+    rig: Option<&Rig>,
+    claims: Claims,
+    clock: &mut C,
+) -> Result<Option<Manifest>, Refusal> {
+    let Some(keys) = trust.keys() else {
+        return Ok(None);
+    };
+    if record.length == 0 {
+        return claims.check_factory().map(|()| None);
     }
+    let blob = blob_bytes(slot, record).unwrap_or_default();
+    let manifest = manifest_bytes(slot, record);
+    keys.check_stored(manifest, blob, rig, claims, &mut || clock.step())
+        .map(Some)
 }
 
 /// Reads all of a record's blob through the driver and compares its checksum, and all of its manifest, so

@@ -126,6 +126,7 @@ impl ClientError {
                     | Refusal::UnknownMessage
                     | Refusal::WrongOffset { .. }
                     | Refusal::NoUpdate
+                    | Refusal::WrongPiece { .. }
                     | Refusal::Incomplete { .. }
                     | Refusal::ChecksumMismatch { .. }
                     | Refusal::FlashFailed { .. }

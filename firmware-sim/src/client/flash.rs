@@ -7,9 +7,8 @@ use ray_runtime::{OpenError, RayBlob};
 
 use super::{ClientError, DeviceClient, unexpected};
 use ray_device::frame::checksum;
-use ray_device::protocol::{
-    Chunk, MAX_CHUNK, NewBlob, Refusal, Reply, Request, Signature, StoredBlob, name,
-};
+use ray_device::manifest::{Link, ManifestBytes, NO_LINK, PIECE_LENGTH, link};
+use ray_device::protocol::{Chunk, MAX_CHUNK, NewBlob, Refusal, Reply, Request, StoredBlob, name};
 use ray_device::storage::rig;
 
 /// How patiently a blob is sent.
@@ -21,8 +20,8 @@ pub struct FlashOptions {
     pub timeout: Duration,
     /// Serial number of the rig that the blob was calibrated on, if known.
     pub rig_serial: Option<String>,
-    /// Who made the blob, for a device that takes signed ones only.
-    pub signature: Option<Signature>,
+    /// The blob's manifest, signed by the owner, for a device that has one.
+    pub manifest: Option<ManifestBytes>,
 }
 
 impl Default for FlashOptions {
@@ -31,7 +30,7 @@ impl Default for FlashOptions {
             retries: 5,
             timeout: Duration::from_secs(20),
             rig_serial: None,
-            signature: None,
+            manifest: None,
         }
     }
 }
@@ -82,10 +81,15 @@ impl DeviceClient {
             checksum: checksum(blob),
             identity: ask_blob(blob, |blob| *blob.identity()).map_err(ClientError::NotABlob)?,
             rig_serial: options.rig_serial.as_deref().map(name),
-            signature: options.signature,
+            manifest: options.manifest.iter().flatten().copied().collect(),
         };
+        let links = match options.manifest {
+            Some(_) => links(blob),
+            None => Vec::new(),
+        };
+        let pieces = Pieces { blob, links };
         let usual_timeout = std::mem::replace(&mut self.timeout, options.timeout);
-        let outcome = self.flash_patiently(&new, blob, options.retries, on_progress);
+        let outcome = self.flash_patiently(&new, &pieces, options.retries, on_progress);
         self.timeout = usual_timeout;
         outcome
     }
@@ -93,7 +97,7 @@ impl DeviceClient {
     fn flash_patiently(
         &mut self,
         new: &NewBlob,
-        blob: &[u8],
+        pieces: &Pieces<'_>,
         retries: u32,
         on_progress: &mut dyn FnMut(FlashProgress),
     ) -> Result<Flashed, ClientError> {
@@ -113,7 +117,7 @@ impl DeviceClient {
             };
             let outcome = connected.and_then(|()| {
                 is_connected = true;
-                self.transfer(new, blob, &mut progress, on_progress)
+                self.transfer(new, pieces, &mut progress, on_progress)
             });
             let error = match outcome {
                 Ok(flashed) => return Ok(flashed),
@@ -146,13 +150,13 @@ impl DeviceClient {
     fn transfer(
         &mut self,
         new: &NewBlob,
-        blob: &[u8],
+        pieces: &Pieces<'_>,
         progress: &mut FlashProgress,
         on_progress: &mut dyn FnMut(FlashProgress),
     ) -> Result<Flashed, ClientError> {
         // The device compares the cameras itself, but only once it has given up the blob before for it.
         if let Some(own) = &self.status()?.rig {
-            let compared = ask_blob(blob, |blob| rig::compare(blob, own));
+            let compared = ask_blob(pieces.blob, |blob| rig::compare(blob, own));
             compared
                 .map_err(ClientError::NotABlob)?
                 .map_err(ClientError::Refused)?;
@@ -172,7 +176,7 @@ impl DeviceClient {
             on_progress(*progress);
         };
         note(stored);
-        let rest = blob.get(stored as usize..).unwrap_or_default();
+        let rest = pieces.blob.get(stored as usize..).unwrap_or_default();
         let mut chunks = rest.chunks(self.chunk_length());
         let mut next = stored;
         let mut under_way = VecDeque::new();
@@ -181,7 +185,7 @@ impl DeviceClient {
             while under_way.len() < window
                 && let Some(chunk) = chunks.next()
             {
-                under_way.push_back(self.send_chunk(next, chunk)?);
+                under_way.push_back(self.send_chunk(next, chunk, pieces.link_behind(next))?);
                 next += chunk.len() as u32;
             }
             let Some(sequence) = under_way.pop_front() else {
@@ -215,7 +219,7 @@ impl DeviceClient {
     /// # Errors
     /// [`ClientError`].
     pub fn chunk(&mut self, offset: u32, bytes: &[u8]) -> Result<u32, ClientError> {
-        let sequence = self.send_chunk(offset, bytes)?;
+        let sequence = self.send_chunk(offset, bytes, None)?;
         received(&self.receive(sequence)?)
     }
 
@@ -230,7 +234,7 @@ impl DeviceClient {
         }
     }
 
-    /// Gives an update up.
+    /// Gives an update up. On a device with an owner: [`DeviceClient::order`].
     ///
     /// # Errors
     /// [`ClientError`].
@@ -241,11 +245,20 @@ impl DeviceClient {
         }
     }
 
-    fn send_chunk(&mut self, offset: u32, bytes: &[u8]) -> Result<u16, ClientError> {
+    fn send_chunk(
+        &mut self,
+        offset: u32,
+        bytes: &[u8],
+        next: Option<Link>,
+    ) -> Result<u16, ClientError> {
         let Ok(bytes) = heapless::Vec::from_slice(bytes) else {
             return Err(ClientError::Refused(Refusal::BadChunk { missing: 0 }));
         };
-        self.send(&Request::Chunk(Chunk { offset, bytes }))
+        self.send(&Request::Chunk(Chunk {
+            offset,
+            bytes,
+            next,
+        }))
     }
 
     fn chunk_length(&self) -> usize {
@@ -253,6 +266,34 @@ impl DeviceClient {
         let unit = usize::from(self.greeting.unit).clamp(1, MAX_CHUNK);
         (most / unit * unit).max(unit)
     }
+}
+
+/// What is sent of a blob.
+struct Pieces<'a> {
+    blob: &'a [u8],
+    /// Of each piece, for a blob with a manifest.
+    links: Vec<Link>,
+}
+
+impl Pieces<'_> {
+    /// The link behind the piece that starts here.
+    fn link_behind(&self, offset: u32) -> Option<Link> {
+        let piece = offset as usize / PIECE_LENGTH;
+        self.links.get(piece)?;
+        Some(self.links.get(piece + 1).copied().unwrap_or(NO_LINK))
+    }
+}
+
+/// The links of a blob's pieces, in their order.
+fn links(blob: &[u8]) -> Vec<Link> {
+    let mut links = Vec::new();
+    let mut next = NO_LINK;
+    for piece in blob.chunks(PIECE_LENGTH).rev() {
+        next = link(piece, &next);
+        links.push(next);
+    }
+    links.reverse();
+    links
 }
 
 /// What a device says to an announced blob.
@@ -275,7 +316,10 @@ fn received(reply: &Reply) -> Result<u32, ClientError> {
 }
 
 /// Asks a blob, which must be one, whole and readable.
-fn ask_blob<T>(blob: &[u8], ask: impl FnOnce(&RayBlob<'_>) -> T) -> Result<T, OpenError> {
+pub(crate) fn ask_blob<T>(
+    blob: &[u8],
+    ask: impl FnOnce(&RayBlob<'_>) -> T,
+) -> Result<T, OpenError> {
     let mut words = vec![0_u64; blob.len().div_ceil(8)];
     let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
     let (bytes, _) = bytes.split_at_mut(blob.len());

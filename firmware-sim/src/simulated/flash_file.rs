@@ -18,7 +18,8 @@ use ray_device::protocol::Rig;
 use ray_device::storage::log::Log;
 use ray_device::storage::record::Record;
 use ray_device::storage::slot::SlotFlash;
-use ray_device::storage::{program_blob, rig};
+use ray_device::storage::trust::{self, Claims, Trust};
+use ray_device::storage::{manifest_bytes, program_blob, rig};
 
 /// Size of a device's flash, bytes: that of the board which QEMU emulates.
 pub const FLASH_LENGTH: usize = 16 << 20;
@@ -90,6 +91,16 @@ pub enum FlashFileError {
         /// Of a slot, bytes.
         limit: usize,
     },
+    /// A blob was signed for this flash, and not with a key that is given.
+    #[error(
+        "the flash holds a blob that was signed with another key than --public-key gives: give the key that it was signed with, as the same number, or start with another flash file"
+    )]
+    OtherOwner,
+    /// A device with an owner was kept in this flash, and none is named.
+    #[error(
+        "the flash belongs to a device with an owner, and none is given: give the owner's key with --public-key, or start with another flash file"
+    )]
+    NoOwner,
     /// The record of the device's cameras could not be written.
     #[error("the record of the device's cameras could not be written")]
     Rig,
@@ -170,6 +181,34 @@ fn holding_with(rules: Rules, blob: &[u8], own: Option<&Rig>) -> Result<SimFlash
         .and_then(|()| Log::commit(slot, &record, &mut NoClock))
         .map_err(|_| too_long)?;
     Ok(flash)
+}
+
+/// Makes sure that a device which trusts these may have this flash: once something signed was in use, only one of
+/// the same owner.
+///
+/// # Errors
+/// [`FlashFileError::OtherOwner`], [`FlashFileError::NoOwner`].
+pub fn check_owner(flash: &mut SimFlash, trust: Trust) -> Result<(), FlashFileError> {
+    let mut has_signed = false;
+    for slot in &mut flash.regions().slots {
+        let record = Log::read(slot, &mut NoClock).record();
+        let Some(record) = record.filter(|record| record.claims != Claims::default()) else {
+            continue;
+        };
+        let keys = trust.keys().ok_or(FlashFileError::NoOwner)?;
+        // What is damaged is the device's business.
+        let Ok((manifest, signature)) = trust::read(manifest_bytes(slot, &record)) else {
+            continue;
+        };
+        if keys.check_manifest(&manifest, &signature).is_ok() {
+            return Ok(());
+        }
+        has_signed = true;
+    }
+    if has_signed {
+        return Err(FlashFileError::OtherOwner);
+    }
+    Ok(())
 }
 
 impl FlashFile {

@@ -18,6 +18,8 @@ use std::time::{Duration, Instant};
 use crate::client::DeviceClient;
 use crate::simulated::flash_file::{self, FlashFile};
 
+use ray_device::storage::trust::Keys;
+
 use memory::{Backing, Memory};
 
 /// From the start of QEMU to the first answer of the device. It takes about a quarter of a second;
@@ -195,14 +197,20 @@ pub fn build_newest_only_image(image: &str) -> Result<PathBuf, QemuError> {
     Ok(folder.join(DEVICE.target).join("release").join(image))
 }
 
-/// Builds the image of this name for the owner of a key, 64 hexadecimal digits: its device takes no
-/// blobs but those signed with it.
+/// Builds the image of this name for the owner of these keys, who alone may change its device.
 ///
 /// # Errors
 /// As [`build_image`].
-pub fn build_signed_image(image: &str, public_key: &str) -> Result<PathBuf, QemuError> {
-    let key = ("RAYS_PUBLIC_KEY", public_key);
-    DEVICE.build_with(&[image], &["--features", "signed"], &[key])?;
+pub fn build_signed_image(image: &str, keys: Keys) -> Result<PathBuf, QemuError> {
+    let [key_0, key_1] = keys.all().map(|key| match key {
+        Some(key) => key.to_string(),
+        None => String::new(),
+    });
+    let keys = [
+        ("RAYS_PUBLIC_KEY", key_0.as_str()),
+        ("RAYS_PUBLIC_KEY_1", key_1.as_str()),
+    ];
+    DEVICE.build_with(&[image], &["--features", "signed"], &keys)?;
     Ok(DEVICE.image_path(image))
 }
 

@@ -177,7 +177,7 @@ fn new_blob(length: u32, checksum: u32) -> NewBlob {
         checksum,
         identity: [0; 16],
         rig_serial: None,
-        signature: None,
+        manifest: heapless::Vec::new(),
     }
 }
 
@@ -202,6 +202,7 @@ fn another_peers_update_is_in_the_way_until_it_has_been_silent_for_a_while() {
     let chunk = Request::Chunk(ray_device::protocol::Chunk {
         offset: 0,
         bytes: core::iter::repeat_n(7, 16).collect(),
+        next: None,
     });
 
     assert_eq!(device.respond_to(1, &one), receiving(0));
@@ -219,6 +220,9 @@ fn another_peers_update_is_in_the_way_until_it_has_been_silent_for_a_while() {
     assert_eq!(device.respond_to(3, &one), receiving(16));
     assert_eq!(device.respond_to(1, &Request::FinishUpdate), none);
     now_ms.set(13_500);
+    assert_eq!(device.respond_to(2, &other), receiving(0));
+    // What was only announced is in nobody's way.
+    assert_eq!(device.respond_to(4, &one), receiving(0));
     assert_eq!(device.respond_to(2, &other), receiving(0));
     // A peer may always begin anew.
     assert_eq!(device.respond_to(2, &one), receiving(0));
@@ -238,7 +242,11 @@ fn chunks_come_in_order_in_whole_units_and_a_repeat_is_acknowledged() {
         let bytes = core::iter::repeat_n(fill, length).collect();
         device.respond_to(
             0,
-            &Request::Chunk(ray_device::protocol::Chunk { offset, bytes }),
+            &Request::Chunk(ray_device::protocol::Chunk {
+                offset,
+                bytes,
+                next: None,
+            }),
         )
     };
     let bad = |missing| Reply::Refused(Refusal::BadChunk { missing });
@@ -262,6 +270,7 @@ fn chunks_come_in_order_in_whole_units_and_a_repeat_is_acknowledged() {
     let last = Request::Chunk(ray_device::protocol::Chunk {
         offset: 24,
         bytes: core::iter::repeat_n(3, 6).collect(),
+        next: None,
     });
     assert_eq!(device.respond_to(0, &last), receiving(30));
     let Reply::Refused(Refusal::ChecksumMismatch { announced, stored }) =
@@ -301,7 +310,7 @@ fn what_cannot_fit_or_is_for_another_rig_is_refused_before_anything_is_erased() 
     let mut begin = |length, serial: Option<&str>| {
         let new = NewBlob {
             rig_serial: serial.map(name),
-            signature: None,
+            manifest: heapless::Vec::new(),
             ..new_blob(length, 1)
         };
         device.respond_to(0, &Request::BeginUpdate(new))
@@ -330,7 +339,7 @@ fn what_cannot_fit_or_is_for_another_rig_is_refused_before_anything_is_erased() 
     let mut device = device.epoch(&mut regions);
     let new = NewBlob {
         rig_serial: Some(name("17")),
-        signature: None,
+        manifest: heapless::Vec::new(),
         ..new_blob(limit, 1)
     };
     let begun = device.respond_to(0, &Request::BeginUpdate(new));

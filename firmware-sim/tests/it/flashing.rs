@@ -36,7 +36,7 @@ fn announced(blob: &[u8], identity: [u8; IDENTITY_LENGTH]) -> NewBlob {
         checksum: checksum(blob),
         identity,
         rig_serial: None,
-        signature: None,
+        manifest: heapless::Vec::new(),
     }
 }
 
@@ -269,6 +269,7 @@ fn fuzzed_frames_during_an_update_do_not_touch_the_active_blob() {
                     _ => offset as u32 / 8 * 8,
                 },
                 bytes: heapless::Vec::from_slice(&other[offset..end]).unwrap(),
+                next: None,
             };
             let request = match random.random_range(0..12) {
                 0 | 1 => Request::BeginUpdate(NewBlob {

@@ -3,11 +3,17 @@
 
 mod adoption;
 mod app;
+#[cfg(feature = "signed")]
+mod attacks;
 #[path = "../../../ray-runtime/tests/it/c_build.rs"]
 mod c_build;
 mod c_device;
+#[cfg(feature = "signed")]
+mod owner;
 mod parts;
 mod power_cuts;
+#[cfg(feature = "signed")]
+mod requests;
 mod rig;
 mod slot_image;
 mod snapshots;
@@ -21,6 +27,8 @@ mod flashing;
 mod float_modes;
 #[cfg(feature = "command")]
 mod integer;
+#[cfg(all(feature = "command", feature = "signed"))]
+mod owned;
 #[cfg(feature = "command")]
 mod qemu;
 #[cfg(feature = "command")]
@@ -29,5 +37,3 @@ mod running;
 mod same_bits;
 #[cfg(all(feature = "serial", unix))]
 mod serial;
-#[cfg(feature = "signed")]
-mod signed;

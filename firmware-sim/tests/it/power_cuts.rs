@@ -60,11 +60,15 @@ pub fn update(blob: &[u8], identity: [u8; 16]) -> Vec<Request> {
         checksum: checksum(blob),
         identity,
         rig_serial: None,
-        signature: None,
+        manifest: heapless::Vec::new(),
     })];
     for (offset, bytes) in (0..).step_by(MAX_CHUNK).zip(blob.chunks(MAX_CHUNK)) {
         let bytes = heapless::Vec::from_slice(bytes).unwrap();
-        requests.push(Request::Chunk(Chunk { offset, bytes }));
+        requests.push(Request::Chunk(Chunk {
+            offset,
+            bytes,
+            next: None,
+        }));
     }
     requests.push(Request::FinishUpdate);
     requests

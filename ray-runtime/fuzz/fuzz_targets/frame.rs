@@ -34,11 +34,15 @@ static FLASH: LazyLock<Vec<u8>> = LazyLock::new(|| {
         checksum: checksum(bytes),
         identity: *RayBlob::open(bytes).expect("a golden blob").identity(),
         rig_serial: None,
-        signature: None,
+        manifest: heapless::Vec::new(),
     }));
     for (offset, bytes) in (0..).step_by(MAX_CHUNK).zip(bytes.chunks(MAX_CHUNK)) {
         let bytes = heapless::Vec::from_slice(bytes).expect("a chunk");
-        ask(Request::Chunk(Chunk { offset, bytes }));
+        ask(Request::Chunk(Chunk {
+            offset,
+            bytes,
+            next: None,
+        }));
     }
     ask(Request::FinishUpdate);
     flash.contents().to_vec()

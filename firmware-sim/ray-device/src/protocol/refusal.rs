@@ -1,6 +1,8 @@
 //! Why a frame or a request was refused: facts on the wire, words and the next step in `Display`.
 
 use ray_runtime::MatchNoise;
+
+use crate::storage::trust::Distrust;
 use serde::{Deserialize, Serialize};
 
 use crate::storage::OTHER_PART;
@@ -96,12 +98,52 @@ pub enum Refusal {
         /// It is given up unless it goes on within this time, ms.
         wait_ms: u32,
     },
-    /// The device takes signed blobs only.
+    /// The device takes signed blobs only, and there is no manifest.
     NotSigned,
-    /// The signature is not that of the device's key over these bytes.
+    /// The signature is not by the key that the manifest or the order names.
     BadSignature,
     /// The noise of matches is not in the range of the runtime's `MatchNoise`.
     BadNoise,
+    /// The manifest cannot be read.
+    BadManifest {
+        /// Its format; 0 if it is no manifest at all, 1 if what it says is impossible.
+        format: u8,
+    },
+    /// The manifest is of another blob than the one announced, or than the one in the slot.
+    OtherManifest,
+    /// The device has no key of the number that the manifest or the order names.
+    NoSuchKey,
+    /// The key that signed was retired by a later manifest.
+    KeyRetired {
+        /// Its number.
+        key: u8,
+    },
+    /// The device has had a newer version, or may not go back so far.
+    VersionTooOld {
+        /// That of the manifest.
+        version: u32,
+        /// The lowest that is taken.
+        least: u32,
+    },
+    /// The bytes of a chunk are not those that the owner signed.
+    WrongPiece {
+        /// Where it starts.
+        offset: u32,
+    },
+    /// The device has an owner, who must sign an order for this.
+    NeedsOrder,
+    /// The order is for another moment: the active blob has another sequence number by now.
+    StaleOrder {
+        /// Of the active blob; 0 if there is none.
+        sequence: u32,
+    },
+    /// The device has no owner who could order anything.
+    NoOwner,
+    /// Too many updates were begun and never finished: the flash is spared for a while.
+    TooManyStarts {
+        /// How long yet, ms; a restart of the device ends it at once.
+        wait_ms: u32,
+    },
 }
 
 /// What of a camera, or of the rig, is not the device's.
@@ -144,6 +186,12 @@ impl core::fmt::Display for Refusal {
             ),
             Self::UnknownMessage => write!(out, "the frame holds no known message"),
             Self::NoBlob { open_error } => {
+                if let Some(reason) = Distrust::from_code(open_error) {
+                    return write!(
+                        out,
+                        "the blob in its flash is not used: {reason} (code {open_error})"
+                    );
+                }
                 // The codes are the runtime's; these are the ones that a user can act upon.
                 let reason = match open_error {
                     2 => "its flash holds no blob",
@@ -224,17 +272,66 @@ impl core::fmt::Display for Refusal {
             ),
             Self::NotSigned => write!(
                 out,
-                "it takes signed blobs only: have it signed with the key that the device was built for, and give --signature"
+                "it has an owner and takes signed blobs only: sign it with the owner's key, calib-offline sign RIG.rays --key key.pem --version N"
             ),
             Self::BadSignature => write!(
                 out,
-                "the signature is not of this blob, or not by the key that the device was built for: nothing was taken"
+                "the signature is not by the owner's key, or not of these words: sign again with the key that the device was built for"
             ),
             Self::BadNoise => write!(
                 out,
                 "the noise of matches must be 0 or {} to {} px: give it so",
                 MatchNoise::LEAST_PX,
                 MatchNoise::MOST_PX
+            ),
+            Self::BadManifest { format: 0 } => write!(
+                out,
+                "what came in place of a manifest is none: give the file that calib-offline sign wrote"
+            ),
+            Self::BadManifest { format: 1 } => write!(
+                out,
+                "the manifest says what cannot be (its key, its versions or its serial number): sign the blob again"
+            ),
+            Self::BadManifest { format } => write!(
+                out,
+                "the manifest is of format {format}, which the device does not read: bring its firmware up to date"
+            ),
+            Self::OtherManifest => write!(
+                out,
+                "the manifest is of another blob: sign this one, or give the manifest that was written for it"
+            ),
+            Self::NoSuchKey => write!(
+                out,
+                "the device has no key of the number that was signed with: sign with --key-number 0 or 1, as it was built for"
+            ),
+            Self::KeyRetired { key } => write!(
+                out,
+                "key {key} is retired on this device: sign with the key after it, and its --key-number"
+            ),
+            Self::VersionTooOld { version, least } => write!(
+                out,
+                "version {version} is too old, the device takes {least} and above: sign the blob that you want with such a --version"
+            ),
+            Self::WrongPiece { offset } => write!(
+                out,
+                "the bytes from {offset} on are not those that the owner signed: send the file that was signed"
+            ),
+            Self::NeedsOrder => write!(
+                out,
+                "the device has an owner, whose order it takes: give the owner's key with --key key.pem"
+            ),
+            Self::StaleOrder { sequence } => write!(
+                out,
+                "the order is for another moment, blob number {sequence} is in use by now: sign a new one"
+            ),
+            Self::NoOwner => write!(
+                out,
+                "the device has no owner and takes no orders: ask without --key"
+            ),
+            Self::TooManyStarts { wait_ms } => write!(
+                out,
+                "too many updates were begun and never finished, so it spares its flash: try again in {} min, or restart it",
+                wait_ms.div_ceil(60_000)
             ),
         }
     }

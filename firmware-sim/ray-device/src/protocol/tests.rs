@@ -6,13 +6,15 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::{
-    BlobStatus, CameraStatus, Chunk, FlashOperation, Hello, MAX_CAMERAS_LISTED, MAX_CHUNK,
-    MAX_MATCHES, MAX_NAME, Match, Measured, Name, NewBlob, NoisyMatches, Point, Refusal, Reply,
-    Request, Rig, RigPart, SelfTestReport, Sighting, Signature, SlotState, Status, StoredBlob,
-    UpdateStatus, name,
+    Arithmetic, BlobStatus, CameraStatus, Chunk, FlashOperation, Hello, MAX_CAMERAS_LISTED, MAX_CHUNK,
+    MAX_MATCHES, MAX_NAME, Match, Measured, Name, NewBlob, NoisyMatches, Order, OwnerStatus, Point,
+    Refusal, Reply, Request, Rig, RigPart, SelfTestReport, Sighting, Signature, SlotState, Status,
+    StoredBlob, UpdateStatus, name,
 };
 use crate::frame::{FrameWriter, MAX_MESSAGE};
 use crate::health::{GapReport, Predicted};
+use crate::manifest::{Action, MANIFEST_LENGTH};
+use crate::storage::trust::Claims;
 
 /// Asserts that `message` is exactly `bytes`, in both directions.
 fn assert_bytes<T: Serialize + DeserializeOwned + PartialEq + std::fmt::Debug>(
@@ -82,19 +84,47 @@ fn bytes_of_an_update() {
         checksum: 1,
         identity: [9; 16],
         rig_serial: Some(name("s")),
-        signature: None,
+        manifest: vec(&[7, 8]),
     };
     #[rustfmt::skip]
     assert_bytes(&Request::BeginUpdate(new), &[
         3, 0xc8, 0x01, 1,
         9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9,
-        1, 1, b's', 0,
+        1, 1, b's', 2, 7, 8,
     ]);
     let chunk = Chunk {
         offset: 128,
         bytes: vec(&[5, 255, 0]),
+        next: None,
     };
-    assert_bytes(&Request::Chunk(chunk), &[4, 0x80, 0x01, 3, 5, 255, 0]);
+    assert_bytes(
+        &Request::Chunk(chunk.clone()),
+        &[4, 0x80, 0x01, 3, 5, 255, 0, 0],
+    );
+    let chunk = Chunk {
+        next: Some([2; 32]),
+        ..chunk
+    };
+    assert_bytes(
+        &Request::Chunk(chunk),
+        &[&[4, 0x80, 0x01, 3, 5, 255, 0, 1][..], &[2; 32]].concat(),
+    );
+    for (action, number) in [(Action::Rollback, 0), (Action::Abort, 1)] {
+        let order = Order {
+            action,
+            key: 1,
+            sequence: 128,
+            signature: Signature {
+                r: [3; 32],
+                s: [4; 32],
+            },
+        };
+        let head = [11, number, 1, 0x80, 0x01];
+        assert_bytes(
+            &Request::Order(order),
+            &[&head[..], &[3; 32], &[4; 32]].concat(),
+        );
+    }
     assert_bytes(&Request::FinishUpdate, &[5]);
     assert_bytes(&Request::AbortUpdate, &[6]);
     assert_bytes(&Request::Rollback, &[7]);
@@ -104,7 +134,7 @@ fn bytes_of_an_update() {
     #[rustfmt::skip]
     assert_bytes(&Reply::Active(STORED), &[
         5, 1, 2, 3, 4,
-        6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6,
+        6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 9,
     ]);
     assert_bytes(&Reply::Aborted, &[6]);
     let report = SelfTestReport {
@@ -138,6 +168,16 @@ const STORED: StoredBlob = StoredBlob {
     length: 3,
     checksum: 4,
     identity: [6; 16],
+    version: 9,
+};
+
+const OWNER: OwnerStatus = OwnerStatus {
+    keys: [Some([5; 8]), None],
+    claims: Claims {
+        newest_version: 9,
+        least_version: 8,
+        least_key: 1,
+    },
 };
 
 #[test]
@@ -176,6 +216,22 @@ fn bytes_of_an_updates_refusals() {
         (R::NotSigned, &[19]),
         (R::BadSignature, &[20]),
         (R::BadNoise, &[21]),
+        (R::BadManifest { format: 2 }, &[22, 2]),
+        (R::OtherManifest, &[23]),
+        (R::NoSuchKey, &[24]),
+        (R::KeyRetired { key: 0 }, &[25, 0]),
+        (
+            R::VersionTooOld {
+                version: 1,
+                least: 2,
+            },
+            &[26, 1, 2],
+        ),
+        (R::WrongPiece { offset: 128 }, &[27, 0x80, 0x01]),
+        (R::NeedsOrder, &[28]),
+        (R::StaleOrder { sequence: 5 }, &[29, 5]),
+        (R::NoOwner, &[30]),
+        (R::TooManyStarts { wait_ms: 6 }, &[31, 6]),
     ] {
         assert_bytes(&Reply::Refused(refusal), &[&[0], bytes].concat());
         // In words, of which the last say what to do.
@@ -235,6 +291,7 @@ fn bytes_of_answers() {
         rig: None,
         gaps: None,
         arithmetic: Arithmetic::Float,
+        owner: None,
     };
     assert_bytes(
         &Reply::Status(without.clone()),
@@ -265,6 +322,8 @@ fn bytes_of_answers() {
             length: 9,
             received: 8,
             identity: [1; 16],
+            checksum: 10,
+            number: 11,
         }),
         rig: Some(Rig {
             serial: name("s"),
@@ -272,6 +331,7 @@ fn bytes_of_answers() {
         }),
         gaps: Some(GAPS),
         arithmetic: Arithmetic::Integer,
+        owner: Some(OWNER),
         ..without
     };
     #[rustfmt::skip]
@@ -282,13 +342,14 @@ fn bytes_of_answers() {
         1, 1, b'l', 0x80, 0x01, 100,
         1, 1,                   // slot 1
         3, 1, 5,
-        2, 1, 2, 3, 4, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6,
-        1, 9, 8, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        2, 1, 2, 3, 4, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 9,
+        1, 9, 8, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 10, 11,
         4, 5, 6,
         1, 1, b's', 1, 1, b'l', 0x80, 0x01, 100,
         1, 3, 0, 0, 0x80, 0xbf, 0, 0, 0, 0x40, 0, 0, 0x80, 0x40,
         1, 2, 0, 0, 0, 0x3f, 0, 0, 0x80, 0xbf, 0, 0, 0x80, 0x3f,
         1,                      // in integers
+        1, 1, 5, 5, 5, 5, 5, 5, 5, 5, 0, 9, 8, 1,
     ]);
 }
 
@@ -373,6 +434,7 @@ fn the_longest_messages_fit_a_frame() {
     let chunk = Request::Chunk(Chunk {
         offset: u32::MAX,
         bytes: vec(&[0xff; MAX_CHUNK]),
+        next: Some([0xff; 32]),
     });
     assert!(writer.seal(u16::MAX, &chunk).is_some());
     let begin = Request::BeginUpdate(NewBlob {
@@ -380,10 +442,7 @@ fn the_longest_messages_fit_a_frame() {
         checksum: u32::MAX,
         identity: [0xff; 16],
         rig_serial: Some(name(&"n".repeat(MAX_NAME))),
-        signature: Some(Signature {
-            r: [0xff; 32],
-            s: [0xff; 32],
-        }),
+        manifest: vec(&[0xff; MANIFEST_LENGTH]),
     });
     assert!(writer.seal(u16::MAX, &begin).is_some());
     for reply in [
@@ -415,6 +474,7 @@ fn longest_status() -> Status {
         sequence: u32::MAX,
         length: u32::MAX,
         checksum: u32::MAX,
+        version: u32::MAX,
         ..STORED
     };
     Status {
@@ -428,6 +488,8 @@ fn longest_status() -> Status {
             length: u32::MAX,
             received: u32::MAX,
             identity: [0xff; 16],
+            checksum: u32::MAX,
+            number: u32::MAX,
         }),
         max_blob: u32::MAX,
         updates: u32::MAX,
@@ -445,6 +507,14 @@ fn longest_status() -> Status {
             ..GAPS
         }),
         arithmetic: Arithmetic::Integer,
+        owner: Some(OwnerStatus {
+            keys: [Some([0xff; 8]); 2],
+            claims: Claims {
+                newest_version: u32::MAX,
+                least_version: u32::MAX,
+                least_key: u32::MAX,
+            },
+        }),
     }
 }
 

@@ -15,20 +15,8 @@
 //! ```
 
 use super::layout::{RECORD_LENGTH, Shape};
+pub use super::trust::Claims;
 use crate::frame::checksum;
-
-/// What the owner's newest manifest claims; carried on from record to record. All 0 for a device without
-/// an owner.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Claims {
-    /// The highest version that was ever made active.
-    pub newest_version: u32,
-    /// Versions below are out of use.
-    pub least_version: u32,
-    /// Keys below are retired.
-    pub least_key: u32,
-}
 
 /// What makes the blob of a slot count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

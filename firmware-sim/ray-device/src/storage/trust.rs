@@ -1,181 +1,294 @@
-//! Whose blobs a device takes: anybody's, or those that carry the signature of one key.
+//! Who may change a device: anybody, or the owner of one or two keys.
 //!
-//! A signature is Ed25519 (RFC 8032) over all bytes of the blob, verified strictly: no second signature of
-//! the same blob passes. The key is fixed when the device is built. Bits in the other slot were
-//! verified when they came, so a rollback does not ask again.
+//! A device with an owner takes a blob only with a [`Manifest`] that the owner signed, and rolls back or
+//! gives an update up only on an order that the owner signed, or on a local call. Signatures are Ed25519
+//! (RFC 8032), verified strictly: no second signature of the same bytes passes. The keys are fixed when
+//! the device is built.
+//!
+//! # Versions
+//! What a device has seen signed is written into each commit record as its [`Claims`]. They never go
+//! back, with one exception: the first manifest of a key that retires the one before begins the count of
+//! versions anew, so that a stolen key cannot use the numbers up.
 
-use crate::protocol::{Refusal, Signature};
+mod keys;
 
-/// Whose blobs a device takes.
+use serde::{Deserialize, Serialize};
+
+use crate::manifest::{Link, Malformed, Manifest};
+use crate::protocol::{NewBlob, Refusal, Rig, RigPart, Signature};
+
+#[cfg(feature = "signed")]
+pub use keys::PublicKey;
+pub use keys::{KeyId, Keys};
+
+/// Who may change a device.
 #[derive(Clone, Copy, Debug, Default)]
 pub enum Trust {
-    /// Anybody's.
+    /// Anybody.
     #[default]
     Anybody,
-    /// Those signed by the owner of this key.
-    #[cfg(feature = "signed")]
-    Signed(PublicKey),
+    /// The owner of these keys.
+    Owner(Keys),
+}
+
+/// What a device has seen signed; all 0 without an owner.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Claims {
+    /// The highest version that was ever in use.
+    pub newest_version: u32,
+    /// No blob of a lower version is used.
+    pub least_version: u32,
+    /// Keys with a lower number are retired.
+    pub least_key: u32,
+}
+
+impl Claims {
+    /// What they become with the blob of this manifest.
+    pub fn after(self, manifest: &Manifest) -> Self {
+        if self.is_succeeded_by(manifest) {
+            return Self {
+                newest_version: manifest.version,
+                least_version: manifest.least_version,
+                least_key: manifest.least_key.into(),
+            };
+        }
+        Self {
+            newest_version: self.newest_version.max(manifest.version),
+            least_version: self.least_version.max(manifest.least_version),
+            least_key: self.least_key.max(manifest.least_key.into()),
+        }
+    }
+
+    /// What two records say together: those of the later key; of one key, the higher of each.
+    pub fn joined(self, other: Self) -> Self {
+        match self.least_key.cmp(&other.least_key) {
+            core::cmp::Ordering::Greater => self,
+            core::cmp::Ordering::Less => other,
+            core::cmp::Ordering::Equal => Self {
+                newest_version: self.newest_version.max(other.newest_version),
+                least_version: self.least_version.max(other.least_version),
+                least_key: self.least_key,
+            },
+        }
+    }
+
+    /// Whether these come after the others: of a later key, or of one key with a newer version.
+    pub fn is_newer_than(self, other: Self) -> bool {
+        (self.least_key, self.newest_version) > (other.least_key, other.newest_version)
+    }
+
+    /// Whether this manifest retires a key whose versions therefore no longer count.
+    fn is_succeeded_by(self, manifest: &Manifest) -> bool {
+        u32::from(manifest.least_key) > self.least_key
+    }
+
+    /// Whether the blob of this manifest may be in use.
+    ///
+    /// # Errors
+    /// [`Refusal::KeyRetired`], [`Refusal::VersionTooOld`].
+    pub fn check_use(self, manifest: &Manifest) -> Result<(), Refusal> {
+        if u32::from(manifest.key) < self.least_key {
+            return Err(Refusal::KeyRetired { key: manifest.key });
+        }
+        if !self.is_succeeded_by(manifest) && manifest.version < self.least_version {
+            return Err(Refusal::VersionTooOld {
+                version: manifest.version,
+                least: self.least_version,
+            });
+        }
+        Ok(())
+    }
+
+    /// Whether the blob that the device was made with, which has no manifest, may be in use: as version 0.
+    ///
+    /// # Errors
+    /// [`Refusal::VersionTooOld`].
+    pub fn check_factory(self) -> Result<(), Refusal> {
+        if self.least_version == 0 {
+            return Ok(());
+        }
+        Err(Refusal::VersionTooOld {
+            version: 0,
+            least: self.least_version,
+        })
+    }
+
+    /// Whether the blob of this manifest may be stored, beside what the slots hold whole: a newer one,
+    /// or the newest one where it has been lost.
+    ///
+    /// # Errors
+    /// As [`Claims::check_use`].
+    pub fn check_update(
+        self,
+        manifest: &Manifest,
+        held: impl IntoIterator<Item = u32>,
+    ) -> Result<(), Refusal> {
+        self.check_use(manifest)?;
+        if self.is_succeeded_by(manifest) || manifest.version > self.newest_version {
+            return Ok(());
+        }
+        let is_lost = !held.into_iter().any(|version| version == manifest.version);
+        if manifest.version == self.newest_version && is_lost {
+            return Ok(());
+        }
+        Err(Refusal::VersionTooOld {
+            version: manifest.version,
+            least: self.newest_version.saturating_add(1),
+        })
+    }
 }
 
 impl Trust {
-    /// Whether a blob must be signed.
+    /// Whether the device has an owner, whose signature is then needed.
     pub const fn needs_signature(&self) -> bool {
-        match self {
-            Self::Anybody => false,
-            #[cfg(feature = "signed")]
-            Self::Signed(_) => true,
-        }
+        matches!(self, Self::Owner(_))
     }
 
-    /// Whether this blob may be taken.
-    ///
-    /// # Errors
-    /// [`Refusal::NotSigned`], [`Refusal::BadSignature`].
-    #[cfg_attr(
-        not(feature = "signed"),
-        allow(unused_variables, clippy::unnecessary_wraps)
-    )]
-    pub fn check(&self, blob: &[u8], signature: Option<&Signature>) -> Result<(), Refusal> {
+    /// The owner's keys.
+    pub const fn keys(&self) -> Option<Keys> {
         match self {
-            Self::Anybody => Ok(()),
-            #[cfg(feature = "signed")]
-            Self::Signed(key) => {
-                let signature = signature.ok_or(Refusal::NotSigned)?;
-                if key.has_signed(blob, signature) {
-                    Ok(())
-                } else {
-                    Err(Refusal::BadSignature)
-                }
-            }
+            Self::Anybody => None,
+            Self::Owner(keys) => Some(*keys),
         }
     }
 }
 
-/// A key that signatures are verified with.
-#[cfg(feature = "signed")]
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PublicKey([u8; 32]);
-
-#[cfg(feature = "signed")]
-impl PublicKey {
-    /// From its 32 bytes.
-    pub const fn from_bytes(bytes: [u8; 32]) -> Self {
-        Self(bytes)
+/// Reads a manifest that is not verified yet.
+///
+/// # Errors
+/// [`Refusal::NotSigned`] without one, [`Refusal::BadManifest`].
+pub fn read(bytes: &[u8]) -> Result<(Manifest, Signature), Refusal> {
+    if bytes.is_empty() {
+        return Err(Refusal::NotSigned);
     }
-
-    /// From its 64 hexadecimal digits; `None` for anything else. Whether it is a point of the curve shows
-    /// when a signature is verified: none passes with one that is not.
-    pub const fn from_hex(text: &str) -> Option<Self> {
-        const fn digit(byte: u8) -> Option<u8> {
-            match byte {
-                b'0'..=b'9' => Some(byte - b'0'),
-                b'a'..=b'f' => Some(byte - b'a' + 10),
-                b'A'..=b'F' => Some(byte - b'A' + 10),
-                _ => None,
-            }
-        }
-        let Some((digits, [])) = text.as_bytes().split_first_chunk::<64>() else {
-            return None;
+    Manifest::parse(bytes).map_err(|malformed| {
+        let format = match malformed {
+            Malformed::NotOne => 0,
+            Malformed::Format { found } => found,
+            Malformed::Contents => 1,
         };
-        let mut key = [0; 32];
-        let mut k = 0;
-        while k < 32 {
-            let (Some(high), Some(low)) = (digit(digits[2 * k]), digit(digits[2 * k + 1])) else {
-                return None;
-            };
-            key[k] = high << 4 | low;
-            k += 1;
-        }
-        Some(Self(key))
-    }
+        Refusal::BadManifest { format }
+    })
+}
 
-    /// Whether the owner of the key signed these bytes.
-    #[cold]
-    #[inline(never)]
-    pub fn has_signed(&self, bytes: &[u8], signature: &Signature) -> bool {
-        let signature = ed25519_dalek::Signature::from_components(signature.r, signature.s);
-        ed25519_dalek::VerifyingKey::from_bytes(&self.0)
-            .is_ok_and(|key| key.verify_strict(bytes, &signature).is_ok())
+/// What is for a rig of another serial number.
+pub(crate) const OTHER_SERIAL: Refusal = Refusal::OtherRig {
+    camera: 0,
+    what: RigPart::Serial,
+    expected: 0,
+    found: 0,
+};
+
+/// Whether a manifest is of the blob that was announced, and for this rig.
+///
+/// # Errors
+/// [`Refusal::OtherManifest`], [`Refusal::OtherRig`].
+pub fn check_fit(manifest: &Manifest, new: &NewBlob, rig: Option<&Rig>) -> Result<(), Refusal> {
+    if (manifest.length, manifest.checksum, manifest.identity)
+        != (new.length, new.checksum, new.identity)
+    {
+        return Err(Refusal::OtherManifest);
+    }
+    check_rig(manifest, rig)
+}
+
+/// Whether a manifest is for this rig. One for a single rig fits no device that does not know its own.
+///
+/// # Errors
+/// [`Refusal::OtherRig`].
+pub fn check_rig(manifest: &Manifest, rig: Option<&Rig>) -> Result<(), Refusal> {
+    match &manifest.rig_serial {
+        Some(serial) if rig.is_none_or(|own| own.serial != *serial) => Err(OTHER_SERIAL),
+        _ => Ok(()),
     }
 }
 
-/// Its 64 hexadecimal digits.
-#[cfg(feature = "signed")]
-impl core::fmt::Display for PublicKey {
-    fn fmt(&self, out: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        self.0.iter().try_for_each(|byte| write!(out, "{byte:02x}"))
-    }
+/// Why a device with an owner does not use a whole blob: codes behind those of the runtime's `OpenError`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Distrust {
+    /// There is no manifest with it.
+    NotSigned = 160,
+    /// The manifest cannot be read.
+    BadManifest = 161,
+    /// It is not signed by a key of the device, or damaged.
+    BadSignature = 162,
+    /// It is of another blob, or the blob is damaged.
+    OtherManifest = 163,
+    /// It is for another rig.
+    OtherRig = 164,
+    /// Its key is retired.
+    KeyRetired = 165,
+    /// Its version is below the least that may be used.
+    VersionTooOld = 166,
 }
 
-#[cfg(all(test, feature = "signed"))]
-mod tests {
-    use super::*;
-
-    /// The second and the third test of RFC 8032, section 7.1.
-    const VECTORS: [(&str, &[u8], &str); 2] = [
-        (
-            "3d4017c3e843895a92b70aa74d1b7ebc9c982ccf2ec4968cc0cd55f12af4660c",
-            &[0x72],
-            "92a009a9f0d4cab8720e820b5f642540a2b27b5416503f8fb3762223ebdb69da\
-             085ac1e43e15996e458f3613d0f11d8c387b2eaeb4302aeeb00d291612bb0c00",
-        ),
-        (
-            "fc51cd8e6218a1a38da47ed00230f0580816ed13ba3303ac5deb911548908025",
-            &[0xaf, 0x82],
-            "6291d657deec24024827e69c3abe01a30ce548a284743a445e3680d7db5ac3ac\
-             18ff9b538d16f290ae67f760984dc6594a7c15e9716ed28dc027beceea1ec40a",
-        ),
+impl Distrust {
+    /// All of them.
+    pub const ALL: [Self; 7] = [
+        Self::NotSigned,
+        Self::BadManifest,
+        Self::BadSignature,
+        Self::OtherManifest,
+        Self::OtherRig,
+        Self::KeyRetired,
+        Self::VersionTooOld,
     ];
 
-    fn signature(hex: &str) -> Signature {
-        let half = |at: usize| PublicKey::from_hex(&hex[at..at + 64]).unwrap().0;
-        Signature {
-            r: half(0),
-            s: half(64),
-        }
+    /// Its stable code.
+    pub const fn code(self) -> u8 {
+        self as u8
     }
 
-    #[test]
-    fn the_published_vectors_pass_and_nothing_else_does() {
-        for (key, message, signed) in VECTORS {
-            let trust = Trust::Signed(PublicKey::from_hex(key).unwrap());
-            let signed = signature(signed);
-            assert_eq!(trust.check(message, Some(&signed)), Ok(()));
-            assert_eq!(trust.check(message, None), Err(Refusal::NotSigned));
-            assert_eq!(trust.check(&[], Some(&signed)), Err(Refusal::BadSignature));
-            for bit in 0..256 {
-                for mut wrong in [signed; 2] {
-                    wrong.r[bit / 8] ^= 1 << (bit % 8);
-                    assert_eq!(
-                        trust.check(message, Some(&wrong)),
-                        Err(Refusal::BadSignature)
-                    );
-                    wrong = signed;
-                    wrong.s[bit / 8] ^= 1 << (bit % 8);
-                    assert_eq!(
-                        trust.check(message, Some(&wrong)),
-                        Err(Refusal::BadSignature)
-                    );
-                }
-            }
-        }
-        // Another's key, and one that is no point of the curve.
-        let signed = signature(VECTORS[0].2);
-        for key in [VECTORS[1].0, &"02".repeat(32)] {
-            let trust = Trust::Signed(PublicKey::from_hex(key).unwrap());
-            assert_eq!(
-                trust.check(&[0x72], Some(&signed)),
-                Err(Refusal::BadSignature)
-            );
-        }
+    /// The one with this code.
+    pub fn from_code(code: u8) -> Option<Self> {
+        Self::ALL.into_iter().find(|reason| reason.code() == code)
     }
 
-    #[test]
-    fn a_key_has_64_hexadecimal_digits() {
-        assert!(PublicKey::from_hex(VECTORS[0].0).is_some());
-        assert!(PublicKey::from_hex(&VECTORS[0].0.to_uppercase()).is_some());
-        for bad in ["", "3d", &"0g".repeat(32), &"00".repeat(33)] {
-            assert_eq!(PublicKey::from_hex(bad), None);
+    /// The one that a refusal of [`Keys::check_stored`] stands for.
+    pub const fn of(refusal: Refusal) -> Self {
+        match refusal {
+            Refusal::NotSigned => Self::NotSigned,
+            Refusal::BadManifest { .. } => Self::BadManifest,
+            Refusal::OtherManifest => Self::OtherManifest,
+            Refusal::OtherRig { .. } => Self::OtherRig,
+            Refusal::KeyRetired { .. } => Self::KeyRetired,
+            Refusal::VersionTooOld { .. } => Self::VersionTooOld,
+            _ => Self::BadSignature,
         }
     }
 }
+
+/// In words, with what to do.
+impl core::fmt::Display for Distrust {
+    fn fmt(&self, out: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        out.write_str(match self {
+            Self::NotSigned => "it is not signed, and the device has an owner: sign it and flash it again",
+            Self::BadManifest => "its manifest cannot be read: flash it again",
+            Self::BadSignature => {
+                "it was not signed with a key of this device: sign it with the owner's key and flash it again"
+            }
+            Self::OtherManifest => "its manifest is of other bytes, or they are damaged: flash it again",
+            Self::OtherRig => "it was signed for another rig: flash the blob of this one",
+            Self::KeyRetired => "the key that signed it is retired: sign it with the key after it",
+            Self::VersionTooOld => "its version is below the least that the owner allows",
+        })
+    }
+}
+
+/// A manifest of which the signature has been verified, and what is expected of the next chunk.
+#[derive(Clone, Debug)]
+pub struct Verified {
+    /// Whose it is.
+    pub keys: Keys,
+    /// Its version.
+    pub version: u32,
+    /// What the device claims once the blob is in use.
+    pub claims: Claims,
+    /// Link of the piece that comes next.
+    pub expected: Link,
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,54 @@
+//! Keys as the verbs read them.
+
+use super::error::Error;
+use super::usage_error::UsageError;
+use calib_blob::pack::BlobError;
+use firmware_sim::owner::{KeyError, OwnerKey, public_key};
+use ray_device::storage::trust::PublicKey;
+use std::path::Path;
+
+/// The private key in this file.
+///
+/// # Errors
+/// [`Error::Blob`] if it cannot be read, [`Error::Usage`] if it holds none.
+pub(super) fn private(path: &Path) -> Result<OwnerKey, Error> {
+    let text = read(path)?;
+    OwnerKey::from_pem(&String::from_utf8_lossy(&text)).map_err(|source| bad(path, source))
+}
+
+/// The public key of these digits, or in the file of this name.
+///
+/// # Errors
+/// As [`private`].
+pub(super) fn public(text: &str) -> Result<PublicKey, Error> {
+    if let Ok(key) = public_key(text) {
+        return Ok(key);
+    }
+    let path = Path::new(text);
+    let text = read(path)?;
+    public_key(&String::from_utf8_lossy(&text)).map_err(|source| bad(path, source))
+}
+
+/// A file of a few bytes.
+///
+/// # Errors
+/// [`Error::Usage`] if there is none, [`Error::Blob`] if it cannot be read.
+pub(super) fn read(path: &Path) -> Result<Vec<u8>, Error> {
+    if !path.exists() {
+        return Err(Error::Usage(UsageError::NotFound {
+            path: path.to_owned(),
+        }));
+    }
+    let bytes = std::fs::read(path).map_err(|source| BlobError::Read {
+        file: path.to_owned(),
+        source,
+    })?;
+    Ok(bytes)
+}
+
+fn bad(path: &Path, source: KeyError) -> Error {
+    Error::Usage(UsageError::Key {
+        path: path.to_owned(),
+        source,
+    })
+}
