@@ -8,6 +8,7 @@ mod attacks;
 #[path = "../../../ray-runtime/tests/it/c_build.rs"]
 mod c_build;
 mod c_device;
+mod more_of_parts;
 #[cfg(feature = "signed")]
 mod owner;
 mod parts;
