@@ -45,7 +45,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 rig_serial: None,
                 signature: None,
             })?;
-            client.chunk(0, &other[..800])?;
+            client.chunk(0, &other[..512])?;
         }
         let flashed = client.flash(blob, &options, &mut |_| {})?;
         let status = client.status()?;

@@ -7,12 +7,14 @@ use std::io::Write;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::str::FromStr;
 
 use clap::{Parser, Subcommand};
 use cost::InQemu;
 use firmware_sim::simulated::flash_file::{self, FlashFile};
 use firmware_sim::simulated::host::SimulatedDevice;
 use firmware_sim::simulated::qemu::{self, QemuDevice};
+use firmware_sim::simulated::sim_flash::Rules;
 use ray_device::protocol::{CameraStatus, MAX_CAMERAS_LISTED, MAX_NAME, Rig, name};
 use ray_device::storage::trust::{PublicKey, Trust};
 
@@ -29,7 +31,17 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     /// The device on this computer.
-    Host(DeviceArguments),
+    Host {
+        #[command(flatten)]
+        device: DeviceArguments,
+        /// The rules of the part that its flash is, with commas between: unit=N and block=N, bytes that are programmed
+        /// (1 to 512) and erased at once (8 and 4096 if not given); erased=00 or ff; ecc=error or fault: what a
+        /// word that a cut of power spoiled does when it is read; blank=fault or undefined: the same of a
+        /// blank word; log-block=N: logs lie in regions with erase blocks of their own; erase=none: no erase is
+        /// needed; stall-ms=N: how long an erase takes. A flash file keeps its rules.
+        #[arg(long, value_name = "RULES", value_parser = Rules::from_str)]
+        flash_rules: Option<Rules>,
+    },
     /// The same application as a Cortex-M4F image in QEMU; the image is built first when it is
     /// missing or stale.
     Qemu {
@@ -90,12 +102,13 @@ impl DeviceArguments {
     }
 
     /// The flash that the device starts with, and the file that it is kept in.
-    fn flash(&self) -> Result<FlashFile, Failure> {
+    fn flash(&self, rules: Option<Rules>) -> Result<FlashFile, Failure> {
         let rig = self.rig()?;
         let Some(path) = &self.flash_file else {
-            return Ok(FlashFile::in_memory(flash_file::blank(rig.as_ref())?));
+            let flash = flash_file::blank_with(rules.unwrap_or_default(), rig.as_ref())?;
+            return Ok(FlashFile::in_memory(flash));
         };
-        let file = FlashFile::open(path, rig.as_ref())?;
+        let file = FlashFile::open_with(path, rules, rig.as_ref())?;
         if file.kept_in.is_none() {
             eprintln!(
                 "firmware-sim: {} is a blob, not the flash of a device: it stays as it is, and what the device is sent is forgotten when it stops. To keep it: --flash-file device.flash, then calib-offline flash {0} --device tcp:ADDRESS:PORT",
@@ -159,7 +172,10 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), Failure> {
     match &arguments.command {
-        Command::Host(device) => run_on_host(device),
+        Command::Host {
+            device,
+            flash_rules,
+        } => run_on_host(device, *flash_rules),
         Command::Qemu { device, image } => run_in_qemu(device, image.as_deref()),
         Command::Cost {
             blobs,
@@ -185,8 +201,8 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-fn run_on_host(arguments: &DeviceArguments) -> Result<(), Failure> {
-    let FlashFile { flash, kept_in } = arguments.flash()?;
+fn run_on_host(arguments: &DeviceArguments, rules: Option<Rules>) -> Result<(), Failure> {
+    let FlashFile { flash, kept_in } = arguments.flash(rules)?;
     let trust = arguments.public_key.map_or(Trust::Anybody, Trust::Signed);
     let device = SimulatedDevice::start_trusting(arguments.listen, flash, trust)
         .map_err(|error| format!("the device on {}: {error}", arguments.listen))?;
@@ -199,7 +215,7 @@ fn run_on_host(arguments: &DeviceArguments) -> Result<(), Failure> {
 fn run_in_qemu(arguments: &DeviceArguments, image: Option<&Path>) -> Result<(), Failure> {
     // Before the image, whose first build takes a minute.
     qemu::require_qemu()?;
-    let flash = arguments.flash()?;
+    let flash = arguments.flash(None)?;
     let image = if let Some(path) = image {
         path.to_owned()
     } else {

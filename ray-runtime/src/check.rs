@@ -29,8 +29,9 @@ pub(crate) fn recognized_header(bytes: &[u8]) -> Result<Header, OpenError> {
     Ok(header)
 }
 
-/// The header of bytes that have the length and the checksum it states.
-pub(crate) fn checked_header(bytes: &[u8]) -> Result<Header, OpenError> {
+/// The header of bytes that have the length and the checksum it states. The checksum is computed, unless
+/// that of all bytes is known.
+pub(crate) fn checked_header(bytes: &[u8], crc_of_all: Option<u32>) -> Result<Header, OpenError> {
     let header = recognized_header(bytes)?;
     let (need, have) = (
         header.total_len,
@@ -42,7 +43,11 @@ pub(crate) fn checked_header(bytes: &[u8]) -> Result<Header, OpenError> {
     if have > need {
         return Err(OpenError::TrailingBytes { need, have });
     }
-    let computed = format::checksum(bytes).ok_or(OpenError::BadHeader)?;
+    let computed = match crc_of_all {
+        Some(crc) => format::checksum_from_all(bytes, crc),
+        None => format::checksum(bytes),
+    };
+    let computed = computed.ok_or(OpenError::BadHeader)?;
     if computed != header.crc {
         return Err(OpenError::BadCrc {
             stated: header.crc,

@@ -19,7 +19,8 @@ pub use axis::Axis;
 pub use encoding::{Encoding, Form, PATCH_LEN, coefficient_count};
 pub use header::{
     ALIGNMENT, CRC_OFFSET, HEADER_LEN, Header, IDENTITY_LEN, MAGIC, MAX_CAMERAS, MAX_CELLS,
-    MAX_EXTENT_PX, MAX_MAGNITUDE, OLDEST_VERSION, VERSION, aligned, checksum, mask_len,
+    MAX_EXTENT_PX, MAX_MAGNITUDE, OLDEST_VERSION, VERSION, aligned, checksum, checksum_from_all,
+    mask_len,
 };
 pub(crate) use message::Messages;
 pub use meta::{CameraMeta, LengthUnit, Meta, PixelConvention, SelfTest};

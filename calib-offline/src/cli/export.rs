@@ -2,6 +2,7 @@
 
 use super::Outcome;
 use super::error::Error;
+use super::export_blob::{self, BlobArgs};
 use super::export_folder;
 use super::export_form::FolderForm;
 use super::export_help::{EXAMPLE, FORMATS};
@@ -33,19 +34,9 @@ pub struct ExportArgs {
     /// The form to write
     #[arg(long, value_name = "FORM", value_enum)]
     pub format: FormatArg,
-    /// Where the blob goes in the device's memory: hex and uf2 need it
-    #[arg(long, value_name = "0x...", value_parser = parse_number)]
-    pub base_address: Option<u32>,
-    /// The number of the family of devices that may take it, for uf2: 0xe48bff56 is the RP2040's
-    #[arg(long, value_name = "0x...", value_parser = parse_number)]
-    pub family: Option<u32>,
-    /// The name of the array.
-    #[arg(
-        long,
-        value_name = "SYMBOL",
-        help = "The name of the array, for c [default: rays_blob]"
-    )]
-    pub name: Option<String>,
+    /// What the forms of one file take.
+    #[command(flatten)]
+    pub blob: BlobArgs,
     /// What the forms of other tools take.
     #[command(flatten)]
     pub folder: FolderArgs,
@@ -114,7 +105,7 @@ pub enum FormatArg {
 }
 
 impl FormatArg {
-    const fn name(self) -> &'static str {
+    pub(super) const fn name(self) -> &'static str {
         match self {
             Self::Hex => "hex",
             Self::Uf2 => "uf2",
@@ -318,7 +309,7 @@ fn write_points(args: &ExportArgs, console: &Console) -> Result<Outcome, Error> 
 
 fn write_file(args: &ExportArgs, start: &[u8], console: &Console) -> Result<Outcome, Error> {
     check_file(&args.output, start, &[&args.rig], args.force)?;
-    let form = form(args)?;
+    let form = args.blob.form(args.format)?;
     let RigFile::Blob(bytes) = RigFile::read(&args.rig)? else {
         return Err(Error::Usage(UsageError::UnknownKind {
             path: args.rig.clone(),
@@ -334,8 +325,8 @@ fn write_file(args: &ExportArgs, start: &[u8], console: &Console) -> Result<Outc
         format: args.format.name(),
         blob_bytes: Some(bytes.len()),
         file_bytes: file.len(),
-        base_address: args.base_address,
-        family: args.family,
+        base_address: args.blob.base_address,
+        family: args.blob.family.map(|family| family.0),
         name: match &form {
             Form::C { name } => Some(name),
             _ => None,
@@ -344,7 +335,7 @@ fn write_file(args: &ExportArgs, start: &[u8], console: &Console) -> Result<Outc
         loss: None,
         points: None,
     };
-    let place = match (args.base_address, object.name) {
+    let place = match (args.blob.base_address, object.name) {
         (Some(first), _) => {
             // The last byte has an address of 32 bits: the form was refused otherwise.
             let last = u64::from(first) + bytes.len() as u64 - 1;
@@ -353,11 +344,15 @@ fn write_file(args: &ExportArgs, start: &[u8], console: &Console) -> Result<Outc
         (None, Some(name)) => format!(" as {name}"),
         (None, None) => String::new(),
     };
-    let words = format!(
+    let mut words = format!(
         "a blob of {} bytes{place}; written to {}",
         bytes.len(),
         args.output.display()
     );
+    for note in export_blob::notes(&form, bytes.len()) {
+        words += "; ";
+        words += &note;
+    }
     console.result(&words, &object);
     Ok(Outcome::Done)
 }
@@ -365,15 +360,6 @@ fn write_file(args: &ExportArgs, start: &[u8], console: &Console) -> Result<Outc
 /// Refuses what the form has no place for.
 fn check_options(args: &ExportArgs) -> Result<(), ExportError> {
     let form = args.format.name();
-    let is_placed = matches!(args.format, FormatArg::Hex | FormatArg::Uf2);
-    let needless = [
-        ("--base-address", args.base_address.is_some() && !is_placed),
-        (
-            "--family",
-            args.family.is_some() && args.format != FormatArg::Uf2,
-        ),
-        ("--name", args.name.is_some() && args.format != FormatArg::C),
-    ];
     let kind = args.format.kind();
     let is_mesh = matches!(kind, Kind::Mesh(_));
     let folder_form = match kind {
@@ -381,57 +367,11 @@ fn check_options(args: &ExportArgs) -> Result<(), ExportError> {
         Kind::File(_) | Kind::Mesh(_) | Kind::Points => None,
     };
     let of_meshes = args.mesh.given().into_iter();
-    let found = needless
-        .into_iter()
-        .chain(of_meshes.map(|(option, is_given)| (option, is_given && !is_mesh)))
-        .find(|(_, is_needless)| *is_needless);
-    let option = found.map(|(option, _)| option);
-    match option.or_else(|| args.folder.needless(folder_form, is_mesh)) {
+    let mut of_meshes = of_meshes.filter(|(_, is_given)| *is_given && !is_mesh);
+    let needless = args.blob.needless(args.format);
+    let needless = needless.or_else(|| of_meshes.next().map(|(option, _)| option));
+    match needless.or_else(|| args.folder.needless(folder_form, is_mesh)) {
         Some(option) => Err(ExportError::NeedlessOption { form, option }),
         None => Ok(()),
-    }
-}
-
-/// The form of one file that the arguments ask for.
-fn form(args: &ExportArgs) -> Result<Form, ExportError> {
-    let form = args.format.name();
-    let base_address = || args.base_address.ok_or(ExportError::NoAddress { form });
-    Ok(match args.format {
-        FormatArg::Hex => Form::Hex {
-            base_address: base_address()?,
-        },
-        FormatArg::Uf2 => Form::Uf2 {
-            base_address: base_address()?,
-            family: args.family,
-        },
-        FormatArg::C => Form::C {
-            name: args.name.clone().unwrap_or_else(|| "rays_blob".to_owned()),
-        },
-        _ => Form::Binary,
-    })
-}
-
-/// A number of 32 bits, hexadecimal behind `0x` or decimal.
-fn parse_number(text: &str) -> Result<u32, String> {
-    let digits = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"));
-    let parsed = match digits {
-        Some(digits) => u32::from_str_radix(digits, 16),
-        None => text.parse(),
-    };
-    parsed.map_err(|_| "give a number of 32 bits such as 0x10100000".to_owned())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_are_hexadecimal_or_decimal() {
-        assert_eq!(parse_number("0x10100000"), Ok(0x1010_0000));
-        assert_eq!(parse_number("0XFF"), Ok(255));
-        assert_eq!(parse_number("4096"), Ok(4096));
-        for bad in ["", "0x", "0x100000000", "-8", "10h", "ff"] {
-            assert!(parse_number(bad).is_err(), "{bad}");
-        }
     }
 }

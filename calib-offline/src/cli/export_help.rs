@@ -3,7 +3,7 @@
 pub(super) const EXAMPLE: &str = "\
 Example:
   calib-offline export rig.rays -o rig.hex --format hex --base-address 0x08100000
-  calib-offline export rig.rays -o rig.uf2 --format uf2 --base-address 0x10100000 --family 0xe48bff56
+  calib-offline export rig.rays -o rig.uf2 --format uf2 --base-address 0x10100000 --family rp2040
   calib-offline export rig.rays -o rig.c --format c --name rig_blob
   calib-offline export calibration.json -o opencv --format opencv
   calib-offline export calibration.json -o fisheye --format kalibr --model equidistant --distance-mm 800
@@ -13,9 +13,12 @@ Example:
 
 pub(super) const FORMATS: &str = "\
 hex, uf2, bin and c take a blob and write one file. The base address is where it goes in the device's memory: a
-multiple of 8, of 256 for uf2, whose last page is filled up with 0xff. The C source defines an
-array, aligned to 8, and its length NAME_len (ray-runtime/c/rays.h opens it). An earlier file of the same
-form is replaced; any other only with --force.
+multiple of 8, of 256 for uf2, whose last page is filled up with 0xff. The boot ROMs of the RP2040 and the RP2350 erase whole
+sectors and leave files without a family alone: there it is a multiple of 4096, the last sector is filled up, and
+--family is required (rp2040, rp2350-arm-s, rp2350-riscv; data or absolute beside a partition table). Some readers, such as
+Nordic's nrf-intel-hex, refuse HEX from 0x80000000 on, where external flash of many parts is: take bin there, and give the tool the address.
+The C source defines an array, aligned to 8, and its length NAME_len (ray-runtime/c/rays.h opens it). docs/FLASHING.md has
+the commands of flash tools. An earlier file of the same form is replaced; any other only with --force.
 
 The others take a blob or a calibration.json and write a folder; files in it are replaced only with --force.
 opencv  NAME.yml a camera and extrinsics.yml (R, T: the second camera from the first, mm)

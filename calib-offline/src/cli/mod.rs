@@ -17,6 +17,7 @@ pub mod error;
 mod error_causes;
 pub mod evaluate;
 pub mod export;
+mod export_blob;
 mod export_folder;
 mod export_form;
 mod export_help;

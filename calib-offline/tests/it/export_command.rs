@@ -25,6 +25,8 @@ const HEX: [&str; 8] = [
     "0x08100000",
 ];
 
+const RP2040: [&str; 5] = ["rig.rays", "--format", "uf2", "--family", "rp2040"];
+
 #[test]
 fn every_form_is_written_and_said() {
     let (folder, blob) = folder();
@@ -39,15 +41,10 @@ fn every_form_is_written_and_said() {
     assert_eq!(written(&["bin"], "rig.bin"), blob);
     let hex = written(&["hex", "--base-address", "0x08100000"], "rig.hex");
     assert!(hex.starts_with(b":020000040810E2\n:10000000"));
-    let uf2 = [
-        "uf2",
-        "--base-address",
-        "269484032",
-        "--family",
-        "0xe48bff56",
-    ];
+    let uf2 = ["uf2", "--base-address", "269484032", "--family", "rp2040"];
     let uf2 = written(&uf2, "rig.uf2");
-    assert_eq!(uf2.len(), blob.len().div_ceil(256) * 512);
+    assert_eq!(uf2.len(), blob.len().div_ceil(4096) * 8192);
+    assert_eq!(uf2[28..32], 0xe48b_ff56_u32.to_le_bytes());
     assert_eq!(uf2[32..288], blob[..256]);
     let source = String::from_utf8(written(&["c", "--name", "my_rig"], "rig.c")).unwrap();
     assert!(source.contains(&format!("my_rig_len = {};", blob.len())));
@@ -114,6 +111,24 @@ fn json_says_what_was_written() {
 }
 
 #[test]
+fn what_a_reader_of_the_file_should_know_is_said() {
+    let (folder, _) = folder();
+    let mut hex = HEX;
+    hex[7] = "0x90000000";
+    let high = run(folder.path(), &hex);
+    high.assert_code(0);
+    assert!(high.stdout.contains("take bin"), "{}", high.stdout);
+    let place = ["--base-address", "0x10100000", "-o", "rig.uf2"];
+    let written = run(folder.path(), &[&["export"], &RP2040[..], &place].concat());
+    written.assert_code(0);
+    assert!(
+        written.stdout.contains("4096 bytes are written"),
+        "{}",
+        written.stdout
+    );
+}
+
+#[test]
 fn wrong_requests_write_nothing() {
     let (folder, blob) = folder();
     let path = folder.path();
@@ -124,7 +139,7 @@ fn wrong_requests_write_nothing() {
     fs::write(path.join("text.rays"), "left,right\n").unwrap();
     fs::write(path.join("calibration.json"), "{}").unwrap();
     let before = contents(path);
-    let cases: [(&[&str], &[&str]); 14] = [
+    let cases: [(&[&str], &[&str]); 19] = [
         (&["damaged.rays", "--format", "bin"], &["damaged", "try: "]),
         (&["short.rays", "--format", "bin"], &["cut off", "try: "]),
         (&["text.rays", "--format", "bin"], &["text.rays: is not"]),
@@ -144,14 +159,38 @@ fn wrong_requests_write_nothing() {
             &["0x8100004 is not a multiple of 8"],
         ),
         (
+            &["rig.rays", "--format", "uf2", "--base-address", "0x8000008"],
+            &["0x8000008 is not a multiple of 256"],
+        ),
+        (
             &[
                 "rig.rays",
                 "--format",
                 "uf2",
                 "--base-address",
-                "0x10100008",
+                "0x10100000",
             ],
-            &["0x10100008 is not a multiple of 256"],
+            &["names no family", "--family rp2040"],
+        ),
+        (
+            &[&RP2040[..], &["--base-address", "0x10100100"]].concat(),
+            &["sector of 4096", "--base-address 0x10101000, or 0x10100000"],
+        ),
+        (
+            &[&RP2040[..], &["--base-address", "0x20000000"]].concat(),
+            &["not in the flash of rp2040", "0x10000000 to 0x10ffffff"],
+        ),
+        (
+            &[
+                &RP2040[..],
+                &["--base-address", "0x10100000", "--absolute-block"],
+            ]
+            .concat(),
+            &["only families of the RP2350", "leave --absolute-block out"],
+        ),
+        (
+            &["rig.rays", "--format", "uf2", "--family", "rp2041"],
+            &["rp2041", "0xe48bff56", "rp2350-arm-s"],
         ),
         (
             &[

@@ -5,8 +5,8 @@ use core::convert::Infallible;
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_write,
 };
-use ray_device::port::{Clock, Link, MappedFlash, Regions, UNIT};
-use ray_device::storage::Layout;
+use ray_device::port::{Clock, Flash, Geometry, Link, MappedFlash, Regions};
+use ray_device::storage::layout::Layout;
 
 use crate::machine;
 
@@ -53,10 +53,14 @@ impl Link for Uart {
 /// Length of an erase block, bytes.
 const BLOCK: usize = 4096;
 
+/// Length of a program unit, bytes.
+const UNIT: usize = 8;
+
 /// The regions of the flash; `None` if they were handed out before.
 pub fn flash_regions() -> Option<Regions<FlashRegion>> {
-    let layout = Layout::of(machine::FLASH_LENGTH as u32, BLOCK as u32)?;
-    let (factory, rest) = machine::flash_to_write()?.split_at_mut_checked(layout.block as usize)?;
+    let layout = const { Layout::of(machine::FLASH_LENGTH as u32, Geometry::of::<FlashRegion>()) }?;
+    let (factory, rest) =
+        machine::flash_to_write()?.split_at_mut_checked(layout.factory as usize)?;
     let (slot_0, rest) = rest.split_at_mut_checked(layout.slot as usize)?;
     let (slot_1, _) = rest.split_at_mut_checked(layout.slot as usize)?;
     Some(Regions {
@@ -119,9 +123,15 @@ impl NorFlash for FlashRegion {
     }
 }
 
+impl Flash for FlashRegion {
+    fn start(&self) -> u32 {
+        self.0.as_ptr().addr().saturating_sub(machine::FLASH_START) as u32
+    }
+}
+
 impl MappedFlash for FlashRegion {
-    fn mapped(&self) -> &[u8] {
-        self.0
+    fn mapped(&self, start: u32, length: u32) -> Option<&[u8]> {
+        self.0.get(start as usize..)?.get(..length as usize)
     }
 }
 

@@ -18,16 +18,19 @@ use heapless::Vec;
 use ray_runtime::{MatchNoise, MeasureError, OpenError, PixelPoint, RayBlob};
 
 use crate::health::Health;
-use crate::port::{Clock, MappedFlash, Regions};
+use crate::port::{Clock, Regions};
 use crate::protocol::{
     BlobStatus, CameraStatus, Chunk, Hello, MAX_CHUNK, MAX_MATCHES, Match, Measured, NewBlob,
     Point, Refusal, Reply, Request, Rig, Sighting, SlotState, Status, StoredBlob, name,
 };
 use crate::session::Responder;
-use crate::storage::log::{Log, Record};
+use crate::storage::factory::Factory;
+use crate::storage::log::Log;
+use crate::storage::record::{Claims, Record};
+use crate::storage::slot::SlotFlash;
 use crate::storage::transfer::{Owner, Peer, Transfer};
 use crate::storage::trust::Trust;
-use crate::storage::{self, blob_bytes, blob_of, max_blob, rig};
+use crate::storage::{self, rig};
 
 /// Version of the application, as [`Hello`] gives it.
 pub const FIRMWARE_VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -74,29 +77,43 @@ impl<C: Clock> Device<C> {
     ///
     /// Flash without a blob that can be used does not stop it: it answers, and says what is wrong.
     #[inline(never)]
-    pub fn epoch<'e, R: MappedFlash>(&'e mut self, regions: &'e mut Regions<R>) -> Epoch<'e, R, C> {
+    pub fn epoch<'e, S: SlotFlash, F: Factory>(
+        &'e mut self,
+        regions: &'e mut Regions<S, F>,
+    ) -> Epoch<'e, S, C> {
         self.health = Health::new();
-        let booted = storage::boot(regions);
-        let rig = rig::read(&regions.factory);
-        let [slot_0, slot_1] = &mut regions.slots;
-        let (active, inactive, inactive_index) = match (booted.active, booted.slots) {
-            (Some(0), _) => (Some(&*slot_0), slot_1, 1),
-            (Some(_), _) => (Some(&*slot_1), slot_0, 0),
-            // The one with less in it.
-            (None, [SlotState::Empty, _]) => (None, slot_0, 0),
-            (None, _) => (None, slot_1, 1),
+        let booted = storage::boot(regions, &mut self.clock);
+        let rig = regions.factory.rig();
+        let Regions {
+            factory,
+            slots: [slot_0, slot_1],
+        } = regions;
+        let factory = factory.blob();
+        let [record_0, record_1] = booted.records;
+        let sequence = |record: Option<Record>| record.map_or(0, |record| record.sequence);
+        let is_0_older = sequence(record_0) <= sequence(record_1);
+        let (active, inactive, inactive_index) = match booted.active {
+            Some(0) => (record_0.map(|record| (&*slot_0, record)), slot_1, 1),
+            Some(1) => (record_1.map(|record| (&*slot_1, record)), slot_0, 0),
+            // The one with less in it: the newest record's claims stay.
+            _ if is_0_older => (None, slot_0, 0),
+            _ => (None, slot_1, 1),
         };
-        let stored = booted.slots.into_iter().find_map(|state| match state {
-            SlotState::Holds(stored) if Some(usize::from(stored.slot)) == booted.active => {
+        let stored = match (booted.active, booted.slots) {
+            (Some(0), [SlotState::Holds(stored), _]) | (Some(1), [_, SlotState::Holds(stored)]) => {
                 Some(stored)
             }
+            (Some(storage::FACTORY), _) => storage::factory_blob(factory),
             _ => None,
-        });
+        };
         let blob = match (active, stored) {
-            (Some(region), Some(stored)) => blob_bytes(region, stored.length)
-                .and_then(storage::open)
-                .map_err(OpenError::code),
-            _ => Err(booted.open_error),
+            (Some((slot, record)), _) => storage::open_of(slot, factory, &record),
+            (None, Some(_)) => storage::open_factory(factory),
+            (None, None) => Err(storage::NO_BLOB),
+        };
+        let blob = match stored {
+            Some(_) => blob.map_err(OpenError::code),
+            None => Err(booted.open_error),
         };
         Epoch {
             device: self,
@@ -106,6 +123,13 @@ impl<C: Clock> Device<C> {
             slots: booted.slots,
             inactive,
             inactive_index,
+            factory,
+            inactive_record: if inactive_index == 0 {
+                record_0
+            } else {
+                record_1
+            },
+            claims: booted.claims,
             next_sequence: booted.next_sequence,
             is_over: false,
         }
@@ -114,19 +138,22 @@ impl<C: Clock> Device<C> {
 
 /// A device for as long as the same blob is active.
 #[derive(Debug)]
-pub struct Epoch<'e, R, C> {
+pub struct Epoch<'e, S, C> {
     device: &'e mut Device<C>,
     blob: Result<RayBlob<'e>, u8>,
     rig: Option<Rig>,
     active: Option<StoredBlob>,
     slots: [SlotState; 2],
-    inactive: &'e mut R,
+    inactive: &'e mut S,
     inactive_index: usize,
+    factory: Option<&'e [u8]>,
+    inactive_record: Option<Record>,
+    claims: Claims,
     next_sequence: Option<u32>,
     is_over: bool,
 }
 
-impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
+impl<S: SlotFlash, C: Clock> Epoch<'_, S, C> {
     /// The answer to a request of this peer.
     pub fn respond_to(&mut self, peer: Peer, request: &Request) -> Reply {
         let reply = match request {
@@ -151,7 +178,7 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
             }
             Err(refusal) => {
                 self.note_refused(refusal);
-                Reply::Refused(self.counted_from_start_of_flash(refusal))
+                Reply::Refused(refusal)
             }
         }
     }
@@ -162,7 +189,8 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
             firmware: name(FIRMWARE_VERSION),
             max_matches: MAX_MATCHES as u8,
             max_chunk: MAX_CHUNK as u16,
-            max_blob: max_blob(self.inactive),
+            max_blob: self.inactive.max_blob(0),
+            unit: self.inactive.shape().blob.line() as u16,
             needs_signature: self.device.trust.needs_signature(),
         }
     }
@@ -182,7 +210,7 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
             active_slot: self.active.map(|stored| stored.slot),
             slots,
             update,
-            max_blob: max_blob(self.inactive),
+            max_blob: self.inactive.max_blob(0),
             updates: self.device.updates,
             rollbacks: self.device.rollbacks,
             rig: self.rig.clone(),
@@ -226,7 +254,7 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
             rig: self.rig.as_ref(),
             trust: self.device.trust,
         };
-        let begun = Transfer::begin(self.inactive, new, peer, &owner, now_ms);
+        let begun = Transfer::begin(self.inactive, new, peer, &owner, &mut self.device.clock);
         if matches!(begun, Ok(_) | Err(Refusal::FlashFailed { .. }))
             && let Some(slot) = self.slots.get_mut(self.inactive_index)
         {
@@ -238,10 +266,9 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
 
     #[inline(never)]
     fn store(&mut self, peer: Peer, chunk: &Chunk) -> Result<Reply, Refusal> {
-        let now_ms = self.device.clock.uptime_ms();
         let transfer = self.device.transfer.as_mut().ok_or(Refusal::NoUpdate)?;
         transfer.check_peer(peer)?;
-        let outcome = transfer.store(self.inactive, chunk, now_ms);
+        let outcome = transfer.store(self.inactive, chunk, &mut self.device.clock);
         if let Err(Refusal::FlashFailed { .. }) = outcome {
             // Part of it may be programmed, and cannot be once more: only a new start helps.
             self.device.transfer = None;
@@ -258,13 +285,18 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
             rig: self.rig.as_ref(),
             trust: self.device.trust,
         };
-        let outcome = transfer.check(self.inactive, &owner);
+        let outcome = transfer.check(self.inactive, &owner, &mut self.device.clock);
         if let Err(refusal @ Refusal::Incomplete { .. }) = outcome {
             return Err(refusal);
         }
         self.device.transfer = None;
         let checked = outcome?;
-        let sequence = checked.commit(self.inactive, self.next_sequence)?;
+        let sequence = checked.commit(
+            self.inactive,
+            self.next_sequence,
+            self.claims,
+            &mut self.device.clock,
+        )?;
         self.device.updates = self.device.updates.saturating_add(1);
         self.is_over = true;
         Ok(Reply::Active(StoredBlob {
@@ -289,42 +321,50 @@ impl<R: MappedFlash, C: Clock> Epoch<'_, R, C> {
         if let Some(transfer) = &self.device.transfer {
             transfer.make_way(peer, self.device.clock.uptime_ms())?;
         }
-        let Some(SlotState::Holds(stored)) = self.slots.get(self.inactive_index).copied() else {
-            return Err(Refusal::NothingToRollBackTo);
+        let state = self.slots.get(self.inactive_index).copied();
+        let (stored, record) = match (state, self.inactive_record) {
+            (Some(SlotState::Holds(stored)), Some(record)) => (stored, record),
+            // Nothing else is there.
+            _ => (self.factory_to_roll_back_to()?, Record::default()),
         };
         let sequence = self.next_sequence.ok_or(Refusal::LogFull)?;
         let record = Record {
             sequence,
-            length: stored.length,
-            checksum: stored.checksum,
+            claims: self.claims,
+            ..record
         };
         // It was whole when the device started; bits may have flipped since.
-        let blob = blob_of(self.inactive, record).map_err(|_| Refusal::NothingToRollBackTo)?;
+        let clock = &mut self.device.clock;
+        let is_whole = record.length == 0 || storage::verify(self.inactive, &record, clock).is_ok();
+        let blob = storage::open_of(&*self.inactive, self.factory, &record)
+            .ok()
+            .filter(|_| is_whole)
+            .ok_or(Refusal::NothingToRollBackTo)?;
         if let Some(own) = &self.rig {
             rig::compare(&blob, own)?;
         }
-        Log::commit(self.inactive, record)?;
+        Log::commit(self.inactive, &record, clock)?;
         self.device.rollbacks = self.device.rollbacks.saturating_add(1);
         self.is_over = true;
         Ok(Reply::Active(StoredBlob { sequence, ..stored }))
     }
+}
 
-    /// A refusal with its address as seen from outside of the slot.
-    fn counted_from_start_of_flash(&self, refusal: Refusal) -> Refusal {
-        let Refusal::FlashFailed { operation, address } = refusal else {
-            return refusal;
-        };
-        let slot_length = self.inactive.capacity() as u32;
-        let slot_start = (R::ERASE_SIZE as u32)
-            .saturating_add(slot_length.saturating_mul(self.inactive_index as u32));
-        Refusal::FlashFailed {
-            operation,
-            address: slot_start.saturating_add(address),
+impl<S: SlotFlash, C: Clock> Epoch<'_, S, C> {
+    /// The factory's blob, unless it is in use.
+    fn factory_to_roll_back_to(&self) -> Result<StoredBlob, Refusal> {
+        let stored = storage::factory_blob(self.factory).ok_or(Refusal::NothingToRollBackTo)?;
+        match self.active {
+            Some(active) if active.checksum != stored.checksum => Ok(StoredBlob {
+                slot: self.inactive_index as u8,
+                ..stored
+            }),
+            _ => Err(Refusal::NothingToRollBackTo),
         }
     }
 }
 
-impl<R: MappedFlash, C: Clock> Responder for Epoch<'_, R, C> {
+impl<S: SlotFlash, C: Clock> Responder for Epoch<'_, S, C> {
     fn respond(&mut self, request: &Request) -> Reply {
         self.respond_to(0, request)
     }

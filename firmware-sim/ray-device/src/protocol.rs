@@ -19,14 +19,13 @@ use crate::health::GapReport;
 pub use refusal::{FlashOperation, Refusal, RigPart};
 
 /// The protocol spoken here. It stands in every frame, and a device refuses any other.
-pub const PROTOCOL_VERSION: u8 = 3;
+pub const PROTOCOL_VERSION: u8 = 4;
 
 /// Matches in one [`Request::Measure`]: with 28 both messages stay below 1 KiB.
 pub const MAX_MATCHES: usize = 28;
 
-/// Bytes of a blob in one [`Request::Chunk`]: a multiple of every program unit, below 1 KiB with its
-/// head.
-pub const MAX_CHUNK: usize = 896;
+/// Bytes of a blob in one [`Request::Chunk`]: a multiple of every program unit that the storage takes.
+pub const MAX_CHUNK: usize = 512;
 
 /// Cameras listed in a [`Status`]; a blob may hold more, [`BlobStatus::camera_count`] says how
 /// many.
@@ -143,15 +142,14 @@ impl Signature {
 pub struct Chunk {
     /// Where in the blob it starts.
     pub offset: u32,
-    /// A multiple of [`UNIT`](crate::port::UNIT) bytes, unless it is the last: whole units are programmed
-    /// as chunks come.
+    /// A multiple of [`Hello::unit`] bytes, unless it is the last: whole units are programmed as chunks come.
     pub bytes: Vec<u8, MAX_CHUNK>,
 }
 
 /// A blob in a slot, with a valid commit record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoredBlob {
-    /// Which slot, 0 or 1.
+    /// Which slot, 0 or 1; 2: none, the device's factory blob is in use.
     pub slot: u8,
     /// Of its commit record: the highest is the active one.
     pub sequence: u32,
@@ -269,6 +267,8 @@ pub struct Hello {
     pub max_chunk: u16,
     /// Longest blob that a slot of its flash holds, bytes.
     pub max_blob: u32,
+    /// What its flash programs in one go, bytes: a power of two from 8 to [`MAX_CHUNK`].
+    pub unit: u16,
     /// Whether it takes signed blobs only.
     pub needs_signature: bool,
 }
@@ -285,7 +285,7 @@ pub struct Status {
     /// The blob in use, or the stable code of the runtime's `OpenError` that says why there is
     /// none.
     pub blob: Result<BlobStatus, u8>,
-    /// Which slot it is in.
+    /// Which slot it is in; 2: the device's factory blob.
     pub active_slot: Option<u8>,
     /// What each slot holds.
     pub slots: [SlotState; 2],

@@ -1,79 +1,166 @@
 //! Two slots for a blob in NOR flash, of which one is active, whatever happens.
 //!
 //! ```text
-//! factory block | slot 0: log block, blob | slot 1: log block, blob
+//! factory | slot 0: log, blob, manifest | slot 1: log, blob, manifest
 //! ```
-//! A slot's first erase block is its [log] of commit records; the blob starts behind it, on a multiple
-//! of 8. An update erases the log of the inactive slot first, so that nothing there counts any more,
+//! A slot starts with its [log] of commit records; [`layout`] says how long that is and where the blob
+//! starts. An update erases the log of the inactive slot first, so that nothing there counts any more,
 //! then each block of the blob as bytes come for it, programs, reads back, and at the very end
 //! appends one commit record. The valid record with the highest sequence number wins, if the blob
 //! behind it has its checksum and can be opened. A rollback appends a record to the other slot's log.
 //! Of the active slot, nothing is erased or programmed while it is in use.
 //!
 //! # What a cut of power leaves
-//! The unit that was being programmed may have lost some of its bits, or read differently each time.
-//! What [`boot`] decides is therefore written down before the device serves: see [`log`].
+//! The unit that was being programmed may have lost some of its bits, read differently each time, or not
+//! be readable at all, and the same goes for a block that was being erased.
+//! What [`boot`] decides is therefore written down before the device serves: see [`log`]. Flash is read through
+//! the driver before it is looked at in place, and a read that fails is damage, not a failure of the device.
 //!
-//! Assumed is that a cut hits one program unit of up to 8 bytes ([`UNIT`]), or one erase block, and nothing that
-//! was complete before.
+//! Assumed is that a cut hits one program unit, or one erase block, and nothing that was complete before.
+//!
+//! # Which flash
+//! Units of 1 to 512 bytes, blocks that are a power of two of at least 64. Anything else does not compile:
+//! ```
+//! # use ray_device::port::{Flash, Geometry};
+//! # use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
+//! # struct Part<const UNIT: usize, const BLOCK: usize>;
+//! # impl<const U: usize, const B: usize> ErrorType for Part<U, B> { type Error = NorFlashErrorKind; }
+//! # impl<const U: usize, const B: usize> ReadNorFlash for Part<U, B> {
+//! #     const READ_SIZE: usize = 1;
+//! #     fn read(&mut self, _: u32, _: &mut [u8]) -> Result<(), NorFlashErrorKind> { Ok(()) }
+//! #     fn capacity(&self) -> usize { 1 << 20 }
+//! # }
+//! # impl<const U: usize, const B: usize> NorFlash for Part<U, B> {
+//! #     const WRITE_SIZE: usize = U;
+//! #     const ERASE_SIZE: usize = B;
+//! #     fn erase(&mut self, _: u32, _: u32) -> Result<(), NorFlashErrorKind> { Ok(()) }
+//! #     fn write(&mut self, _: u32, _: &[u8]) -> Result<(), NorFlashErrorKind> { Ok(()) }
+//! # }
+//! # impl<const U: usize, const B: usize> Flash for Part<U, B> {}
+//! ray_device::storage::require_supported::<Part<512, 512>>();
+//! ```
+//! A unit of 1024 bytes:
+//! ```compile_fail
+//! # use ray_device::port::{Flash, Geometry};
+//! # use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
+//! # struct Part<const UNIT: usize, const BLOCK: usize>;
+//! # impl<const U: usize, const B: usize> ErrorType for Part<U, B> { type Error = NorFlashErrorKind; }
+//! # impl<const U: usize, const B: usize> ReadNorFlash for Part<U, B> {
+//! #     const READ_SIZE: usize = 1;
+//! #     fn read(&mut self, _: u32, _: &mut [u8]) -> Result<(), NorFlashErrorKind> { Ok(()) }
+//! #     fn capacity(&self) -> usize { 1 << 20 }
+//! # }
+//! # impl<const U: usize, const B: usize> NorFlash for Part<U, B> {
+//! #     const WRITE_SIZE: usize = U;
+//! #     const ERASE_SIZE: usize = B;
+//! #     fn erase(&mut self, _: u32, _: u32) -> Result<(), NorFlashErrorKind> { Ok(()) }
+//! #     fn write(&mut self, _: u32, _: &[u8]) -> Result<(), NorFlashErrorKind> { Ok(()) }
+//! # }
+//! # impl<const U: usize, const B: usize> Flash for Part<U, B> {}
+//! ray_device::storage::require_supported::<Part<1024, 4096>>();
+//! ```
+//! A unit of 24 bytes:
+//! ```compile_fail
+//! # use ray_device::port::{Flash, Geometry};
+//! # use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
+//! # struct Part<const UNIT: usize, const BLOCK: usize>;
+//! # impl<const U: usize, const B: usize> ErrorType for Part<U, B> { type Error = NorFlashErrorKind; }
+//! # impl<const U: usize, const B: usize> ReadNorFlash for Part<U, B> {
+//! #     const READ_SIZE: usize = 1;
+//! #     fn read(&mut self, _: u32, _: &mut [u8]) -> Result<(), NorFlashErrorKind> { Ok(()) }
+//! #     fn capacity(&self) -> usize { 1 << 20 }
+//! # }
+//! # impl<const U: usize, const B: usize> NorFlash for Part<U, B> {
+//! #     const WRITE_SIZE: usize = U;
+//! #     const ERASE_SIZE: usize = B;
+//! #     fn erase(&mut self, _: u32, _: u32) -> Result<(), NorFlashErrorKind> { Ok(()) }
+//! #     fn write(&mut self, _: u32, _: &[u8]) -> Result<(), NorFlashErrorKind> { Ok(()) }
+//! # }
+//! # impl<const U: usize, const B: usize> Flash for Part<U, B> {}
+//! ray_device::storage::require_supported::<Part<24, 4096>>();
+//! ```
+//! A block smaller than the unit:
+//! ```compile_fail
+//! # use ray_device::port::{Flash, Geometry};
+//! # use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
+//! # struct Part<const UNIT: usize, const BLOCK: usize>;
+//! # impl<const U: usize, const B: usize> ErrorType for Part<U, B> { type Error = NorFlashErrorKind; }
+//! # impl<const U: usize, const B: usize> ReadNorFlash for Part<U, B> {
+//! #     const READ_SIZE: usize = 1;
+//! #     fn read(&mut self, _: u32, _: &mut [u8]) -> Result<(), NorFlashErrorKind> { Ok(()) }
+//! #     fn capacity(&self) -> usize { 1 << 20 }
+//! # }
+//! # impl<const U: usize, const B: usize> NorFlash for Part<U, B> {
+//! #     const WRITE_SIZE: usize = U;
+//! #     const ERASE_SIZE: usize = B;
+//! #     fn erase(&mut self, _: u32, _: u32) -> Result<(), NorFlashErrorKind> { Ok(()) }
+//! #     fn write(&mut self, _: u32, _: &[u8]) -> Result<(), NorFlashErrorKind> { Ok(()) }
+//! # }
+//! # impl<const U: usize, const B: usize> Flash for Part<U, B> {}
+//! ray_device::storage::require_supported::<Part<512, 256>>();
+//! ```
+//! A block of 1000 bytes:
+//! ```compile_fail
+//! # use ray_device::port::{Flash, Geometry};
+//! # use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
+//! # struct Part<const UNIT: usize, const BLOCK: usize>;
+//! # impl<const U: usize, const B: usize> ErrorType for Part<U, B> { type Error = NorFlashErrorKind; }
+//! # impl<const U: usize, const B: usize> ReadNorFlash for Part<U, B> {
+//! #     const READ_SIZE: usize = 1;
+//! #     fn read(&mut self, _: u32, _: &mut [u8]) -> Result<(), NorFlashErrorKind> { Ok(()) }
+//! #     fn capacity(&self) -> usize { 1 << 20 }
+//! # }
+//! # impl<const U: usize, const B: usize> NorFlash for Part<U, B> {
+//! #     const WRITE_SIZE: usize = U;
+//! #     const ERASE_SIZE: usize = B;
+//! #     fn erase(&mut self, _: u32, _: u32) -> Result<(), NorFlashErrorKind> { Ok(()) }
+//! #     fn write(&mut self, _: u32, _: &[u8]) -> Result<(), NorFlashErrorKind> { Ok(()) }
+//! # }
+//! # impl<const U: usize, const B: usize> Flash for Part<U, B> {}
+//! ray_device::storage::require_supported::<Part<8, 1000>>();
+//! ```
 
+pub mod access;
+pub mod factory;
+pub mod layout;
 pub mod log;
+pub mod record;
 pub mod rig;
+pub mod slot;
 pub mod transfer;
 pub mod trust;
 
-use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 use ray_runtime::{OpenError, RayBlob};
 
-use crate::frame::checksum;
-use crate::port::{MappedFlash, Regions, UNIT};
-use crate::protocol::{FlashOperation, Refusal, SlotState, StoredBlob};
-use log::{Log, Record};
+use crate::port::{Clock, Flash, Geometry, MappedFlash, Regions};
+use crate::protocol::{Refusal, SlotState, StoredBlob};
+use access::{checksum, erase, program};
+use factory::{FACTORY_SLOT, Factory};
+use layout::aligned;
+use log::{Log, erase_log};
+use record::{Claims, Record};
+use slot::SlotFlash;
 
-/// Where the regions of a flash start and how long they are, bytes from its start.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Layout {
-    /// Length of an erase block, and so of the factory record's.
-    pub block: u32,
-    /// Length of a slot.
-    pub slot: u32,
-}
-
-impl Layout {
-    /// For a flash of `capacity` bytes in blocks of `block`: one block for the factory record, and
-    /// half of the rest for each slot. `None` if that leaves a slot less than two blocks, or the
-    /// blocks are no multiple of an entry of the log.
-    pub const fn of(capacity: u32, block: u32) -> Option<Self> {
-        if block == 0 || !block.is_multiple_of(log::ENTRY_LENGTH as u32) {
-            return None;
-        }
-        let Some(blocks) = (capacity / block).checked_sub(1) else {
-            return None;
-        };
-        let slot = blocks / 2 * block;
-        if slot < 2 * block {
-            return None;
-        }
-        Some(Self { block, slot })
+/// Refuses, at compile time, flash that the storage cannot work with.
+#[inline(always)]
+pub const fn require_supported<R: Flash>() {
+    const {
+        assert!(
+            R::WRITE_SIZE.is_power_of_two() && R::WRITE_SIZE <= Geometry::MAX_UNIT as usize,
+            "this flash cannot hold blobs: its program unit (NorFlash::WRITE_SIZE) must be a power of two of at most 512 \
+             bytes; if the chip takes smaller units than its driver, wrap the driver"
+        );
+        assert!(
+            Geometry::of::<R>().is_supported(),
+            "this flash cannot hold blobs: its erase block (NorFlash::ERASE_SIZE) must be a power of two of at least 64 \
+             bytes and no smaller than its program unit"
+        );
+        assert!(
+            Geometry::of::<R>().line() as usize % R::READ_SIZE == 0 && R::READ_SIZE <= 8,
+            "this flash cannot hold blobs: what its driver reads at once (ReadNorFlash::READ_SIZE) must be 1, 2, 4 or 8 \
+             bytes; wrap a driver that reads more"
+        );
     }
-
-    /// Where a slot starts.
-    pub const fn slot_start(self, slot: usize) -> u32 {
-        match slot {
-            0 => self.block,
-            _ => self.block + self.slot,
-        }
-    }
-
-    /// Longest blob, bytes.
-    pub const fn max_blob(self) -> u32 {
-        self.slot - self.block
-    }
-}
-
-/// Longest blob in a slot of this flash, bytes.
-pub fn max_blob<R: NorFlash>(slot: &R) -> u32 {
-    slot.capacity().saturating_sub(R::ERASE_SIZE) as u32
 }
 
 /// What a device starts with.
@@ -83,95 +170,191 @@ pub struct Booted {
     pub active: Option<usize>,
     /// What the slots hold.
     pub slots: [SlotState; 2],
-    /// The stable code of the runtime's `OpenError` for why no slot can be used.
+    /// The records that say so.
+    pub records: [Option<Record>; 2],
+    /// The claims of the newest record, whatever became of its blob.
+    pub claims: Claims,
+    /// The stable code of the runtime's `OpenError` for why no slot can be used, or [`OTHER_PART`].
     pub open_error: u8,
     /// The next commit record's sequence number; `None` when they have run out.
     pub next_sequence: Option<u32>,
 }
+
+/// In place of an `OpenError`'s code: the slot was written for a flash of another unit or block.
+pub const OTHER_PART: u8 = 128;
 
 /// Decides which slot is active, and writes the decision down wherever the flash might say something
 /// else the next time.
 ///
 /// It never fails: flash that cannot be written leaves the decision as it is.
 #[inline(never)]
-pub fn boot<R: MappedFlash>(regions: &mut Regions<R>) -> Booted {
+pub fn boot<S: SlotFlash, F: Factory, C: Clock>(
+    regions: &mut Regions<S, F>,
+    clock: &mut C,
+) -> Booted {
+    require_supported::<S::Log>();
+    require_supported::<S::Blob>();
     let Regions {
+        factory,
         slots: [slot_0, slot_1],
-        ..
     } = regions;
-    let records = [settle(slot_0), settle(slot_1)];
+    let factory = factory.blob();
+    let logs = [settle(slot_0, clock), settle(slot_1, clock)];
+    let mut records = logs.map(|log| log.record());
     let mut slots = [
-        inspect(0, slot_0, records[0]),
-        inspect(1, slot_1, records[1]),
+        inspect(0, slot_0, &logs[0], factory, clock),
+        inspect(1, slot_1, &logs[1], factory, clock),
     ];
-    let highest = records.iter().flatten().map(|record| record.sequence).max();
-    let held = slots.map(|state| match state {
-        SlotState::Holds(stored) => Some(stored),
-        _ => None,
-    });
-    let active = match held {
+    let newest = match records {
+        [Some(a), Some(b)] if b.sequence > a.sequence => Some(b),
+        [Some(a), _] => Some(a),
+        [None, b] => b,
+    }
+    .unwrap_or_default();
+    let mut active = match held(&slots) {
         [Some(a), Some(b)] if b.sequence > a.sequence => Some((1, b)),
         [Some(a), _] => Some((0, a)),
         [None, Some(b)] => Some((1, b)),
-        [None, None] => None,
+        [None, None] => factory_blob(factory).map(|stored| (FACTORY, stored)),
     };
-    let mut next_sequence = highest.unwrap_or(0).checked_add(1);
-    if let (Some((slot, stored)), Some(highest), Some(next)) = (active, highest, next_sequence)
-        && highest > stored.sequence
+    let mut next_sequence = newest.sequence.checked_add(1);
+    if let (Some((used, stored)), Some(next)) = (active, next_sequence)
+        && newest.sequence > stored.sequence
     {
-        // The newest blob was damaged. Should it read well again one day, it must not come back.
-        let region = if slot == 0 { slot_0 } else { slot_1 };
-        let record = Record {
-            sequence: next,
-            length: stored.length,
-            checksum: stored.checksum,
+        // The newest blob was damaged. Should it read well again one day, it must not come back. The factory's is
+        // noted in the log of that one.
+        let slot = match (used, &records) {
+            (FACTORY, [Some(record), _]) if *record == newest => 0,
+            (FACTORY, _) => 1,
+            (slot, _) => slot,
         };
-        if Log::read(region).append(region, record).is_ok() {
-            let state = SlotState::Holds(StoredBlob {
+        let (region, record, state) = match (slot, &mut records, &mut slots) {
+            (0, [record, _], [state, _]) => (slot_0, record, state),
+            (_, [_, record], [_, state]) => (slot_1, record, state),
+        };
+        let again = match *record {
+            Some(record) if used != FACTORY => record,
+            _ => Record::default(),
+        };
+        let again = Record {
+            sequence: next,
+            claims: newest.claims,
+            ..again
+        };
+        if Log::read(region, clock)
+            .append(region, &again, clock)
+            .is_ok()
+        {
+            *record = Some(again);
+            let stored = StoredBlob {
+                slot: slot as u8,
                 sequence: next,
                 ..stored
-            });
-            match slot {
-                0 => slots[0] = state,
-                _ => slots[1] = state,
-            }
+            };
+            *state = SlotState::Holds(stored);
+            active = Some((slot, stored));
             next_sequence = next.checked_add(1);
         }
     }
     Booted {
         active: active.map(|(slot, _)| slot),
         slots,
+        records,
+        claims: newest.claims,
         open_error: open_error(slots),
         next_sequence,
     }
 }
 
-/// The record that a slot's log stands for, made to last.
+/// In place of a slot: the factory's blob, without a record that says so.
+pub const FACTORY: usize = FACTORY_SLOT as usize;
+
+/// Why there is nothing to open: nothing was ever stored.
+pub const NO_BLOB: OpenError = OpenError::BadMagic { found: u32::MAX };
+
+/// The factory's blob, with a look at all of it.
+///
+/// # Errors
+/// Any [`OpenError`]; [`NO_BLOB`] if there is none.
 #[inline(never)]
-fn settle<R: MappedFlash>(slot: &mut R) -> Option<Record> {
-    let log = Log::read(slot);
-    if log.is_settled() {
-        return log.record();
-    }
-    if let Some(record) = log.record()
-        && log.append(slot, record).is_ok()
-    {
-        return Some(record);
-    }
-    // Nothing of it reads as a record, or there is no room to write it again.
-    if log.record().is_none() {
-        let _ = slot.erase(0, R::ERASE_SIZE as u32);
-    }
-    log.record()
+pub fn open_factory(factory: Option<&[u8]>) -> Result<RayBlob<'_>, OpenError> {
+    let bytes = factory.ok_or(NO_BLOB)?;
+    RayBlob::open_with_crc_of_all(bytes, crate::frame::checksum(bytes))
 }
 
-/// What a slot holds, by its record.
+/// What is to be said of the factory's blob, if there is one and it can be used.
 #[inline(never)]
-fn inspect<R: MappedFlash>(index: u8, slot: &R, record: Option<Record>) -> SlotState {
-    let Some(record) = record else {
+pub fn factory_blob(factory: Option<&[u8]>) -> Option<StoredBlob> {
+    let bytes = factory?;
+    let blob = open_factory(factory).ok()?;
+    Some(StoredBlob {
+        slot: FACTORY_SLOT,
+        sequence: 0,
+        length: bytes.len() as u32,
+        checksum: crate::frame::checksum(bytes),
+        identity: *blob.identity(),
+    })
+}
+
+/// The blobs that can be used.
+fn held(slots: &[SlotState; 2]) -> [Option<StoredBlob>; 2] {
+    slots.map(|state| match state {
+        SlotState::Holds(stored) => Some(stored),
+        _ => None,
+    })
+}
+
+/// What a slot's log stands for, made to last.
+#[inline(never)]
+fn settle<S: SlotFlash, C: Clock>(slot: &mut S, clock: &mut C) -> Log {
+    let log = Log::read(slot, clock);
+    if log.is_settled() || !log.is_of_this_part() {
+        return log;
+    }
+    let is_written = match log.record() {
+        Some(record) => log.append(slot, &record, clock).is_ok(),
+        None => false,
+    };
+    // Nothing of it reads as a record, or there is no room to write it again.
+    if !is_written && log.record().is_none() {
+        let _ = erase_log(slot, clock);
+    }
+    log
+}
+
+/// What a slot holds, by its log.
+#[inline(never)]
+fn inspect<S: SlotFlash, C: Clock>(
+    index: u8,
+    slot: &mut S,
+    log: &Log,
+    factory: Option<&[u8]>,
+    clock: &mut C,
+) -> SlotState {
+    let Some(record) = log.record() else {
         return SlotState::Empty;
     };
-    match blob_of(slot, record) {
+    let unusable = |open_error| SlotState::Unusable {
+        sequence: record.sequence,
+        open_error,
+    };
+    if !log.is_of_this_part() {
+        return unusable(OTHER_PART);
+    }
+    if record.length == 0 {
+        return match factory_blob(factory) {
+            Some(stored) => SlotState::Holds(StoredBlob {
+                slot: index,
+                sequence: record.sequence,
+                ..stored
+            }),
+            None => unusable(NO_BLOB.code()),
+        };
+    }
+    if let Err(error) = verify(slot, &record, clock) {
+        return unusable(error.code());
+    }
+    match open_verified(slot, &record) {
         Ok(blob) => SlotState::Holds(StoredBlob {
             slot: index,
             sequence: record.sequence,
@@ -179,51 +362,158 @@ fn inspect<R: MappedFlash>(index: u8, slot: &R, record: Option<Record>) -> SlotS
             checksum: record.checksum,
             identity: *blob.identity(),
         }),
-        Err(error) => SlotState::Unusable {
-            sequence: record.sequence,
-            open_error: error.code(),
-        },
+        Err(error) => unusable(error.code()),
     }
 }
 
-/// The blob of a record, opened in place after a look at all of it.
+/// Reads all of a record's blob through the driver and compares its checksum, and all of its manifest, so
+/// that they can be looked at in place.
 ///
 /// # Errors
-/// Any [`OpenError`], among them the checksum of the record that is not that of the bytes.
-pub fn blob_of<R: MappedFlash>(slot: &R, record: Record) -> Result<RayBlob<'_>, OpenError> {
-    let bytes = blob_bytes(slot, record.length)?;
-    let blob = open(bytes)?;
-    let computed = checksum(bytes);
-    if computed != record.checksum {
-        return Err(OpenError::BadCrc {
-            stated: record.checksum,
-            computed,
+/// [`OpenError::Truncated`] if the slot is shorter, [`OpenError::BadCrc`] if the bytes are others or cannot be read.
+#[inline(never)]
+pub fn verify<S: SlotFlash, C: Clock>(
+    slot: &mut S,
+    record: &Record,
+    clock: &mut C,
+) -> Result<(), OpenError> {
+    let limit = slot.max_blob(record.manifest_length);
+    if record.length > limit {
+        return Err(OpenError::Truncated {
+            need: record.length,
+            have: limit,
         });
     }
-    Ok(blob)
+    let stated = record.checksum;
+    let computed = stored_checksum(slot, record.length, clock).unwrap_or(!stated);
+    let shape = slot.shape();
+    let manifest = checksum(
+        slot.blob_to_write(),
+        shape.manifest_start(record.length),
+        record.manifest_length,
+        clock,
+    );
+    if computed == stated && manifest.is_ok() {
+        Ok(())
+    } else {
+        Err(OpenError::BadCrc {
+            stated,
+            computed: if computed == stated {
+                !stated
+            } else {
+                computed
+            },
+        })
+    }
 }
 
-/// [`RayBlob::open`], which is long, once in the image.
+/// The checksum of the first `length` bytes of a slot's blob, as the driver reads them.
+///
+/// # Errors
+/// [`Refusal::FlashFailed`].
+pub fn stored_checksum<S: SlotFlash, C: Clock>(
+    slot: &mut S,
+    length: u32,
+    clock: &mut C,
+) -> Result<u32, Refusal> {
+    let start = slot.shape().blob_start();
+    checksum(slot.blob_to_write(), start, length, clock)
+}
+
+/// The blob of a record that [`verify`] found good, opened in place. Its checksum is not computed again.
 ///
 /// # Errors
 /// Any [`OpenError`].
 #[inline(never)]
-pub fn open(bytes: &[u8]) -> Result<RayBlob<'_>, OpenError> {
-    RayBlob::open(bytes)
+pub fn open_verified<'a, S: SlotFlash>(
+    slot: &'a S,
+    record: &Record,
+) -> Result<RayBlob<'a>, OpenError> {
+    RayBlob::open_with_crc_of_all(blob_bytes(slot, record)?, record.checksum)
 }
 
-/// The first bytes behind the log.
+/// The same, or the factory's blob if the record says that.
+///
+/// # Errors
+/// Any [`OpenError`].
+pub fn open_of<'a, S: SlotFlash>(
+    slot: &'a S,
+    factory: Option<&'a [u8]>,
+    record: &Record,
+) -> Result<RayBlob<'a>, OpenError> {
+    if record.length == 0 {
+        open_factory(factory)
+    } else {
+        open_verified(slot, record)
+    }
+}
+
+/// The bytes of a record's blob, for whoever has [verified](verify) them.
 ///
 /// # Errors
 /// [`OpenError::Truncated`] if the slot is shorter.
-pub fn blob_bytes<R: MappedFlash>(slot: &R, length: u32) -> Result<&[u8], OpenError> {
-    let start = R::ERASE_SIZE;
-    slot.mapped()
-        .get(start..start.saturating_add(length as usize))
+pub fn blob_bytes<'a, S: SlotFlash>(slot: &'a S, record: &Record) -> Result<&'a [u8], OpenError> {
+    slot.blob()
+        .mapped(slot.shape().blob_start(), record.length)
         .ok_or(OpenError::Truncated {
-            need: length,
-            have: max_blob(slot),
+            need: record.length,
+            have: slot.max_blob(0),
         })
+}
+
+/// The bytes of a record's manifest, for whoever has [verified](verify) the record; none if it has none, or
+/// one that does not fit the slot.
+pub fn manifest_bytes<'a, S: SlotFlash>(slot: &'a S, record: &Record) -> &'a [u8] {
+    if record.manifest_length == 0 {
+        return &[];
+    }
+    let start = slot.shape().manifest_start(record.length);
+    let bytes = slot.blob().mapped(start, record.manifest_length);
+    bytes.unwrap_or_default()
+}
+
+/// Programs the next bytes of a blob, from `offset` on, a multiple of the line; they may end inside a line if no
+/// more follow. Each block is erased when the first byte for it comes.
+///
+/// # Errors
+/// [`Refusal::FlashFailed`].
+#[inline(never)]
+pub fn program_blob<S: SlotFlash, C: Clock>(
+    slot: &mut S,
+    offset: u32,
+    bytes: &[u8],
+    clock: &mut C,
+) -> Result<(), Refusal> {
+    let start = slot.shape().blob_start().saturating_add(offset);
+    let region = slot.blob_to_write();
+    let block = region.geometry().block;
+    let end = start.saturating_add(bytes.len() as u32);
+    erase(region, aligned(start, block), aligned(end, block), clock)?;
+    program(region, start, bytes, clock)
+}
+
+/// Programs the manifest behind a blob of this length, all of which has been programmed.
+///
+/// # Errors
+/// [`Refusal::FlashFailed`].
+pub fn program_manifest<S: SlotFlash, C: Clock>(
+    slot: &mut S,
+    blob_length: u32,
+    bytes: &[u8],
+    clock: &mut C,
+) -> Result<(), Refusal> {
+    let shape = slot.shape();
+    let offset = shape.manifest_start(blob_length) - shape.blob_start();
+    program_blob(slot, offset, bytes, clock)
+}
+
+/// Reads bytes of a slot's blob through the driver, from `offset` on; both are multiples of 8.
+///
+/// # Errors
+/// [`Refusal::FlashFailed`].
+pub fn read_blob<S: SlotFlash>(slot: &mut S, offset: u32, bytes: &mut [u8]) -> Result<(), Refusal> {
+    let start = slot.shape().blob_start().saturating_add(offset);
+    access::read(slot.blob_to_write(), start, bytes)
 }
 
 /// Why there is no blob: of the newest one that was ever finished, or that there is none.
@@ -233,42 +523,8 @@ fn open_error(slots: [SlotState; 2]) -> u8 {
             sequence,
             open_error,
         } => (sequence, open_error),
-        _ => (0, OpenError::BadMagic { found: u32::MAX }.code()),
+        _ => (0, NO_BLOB.code()),
     };
     let [a, b] = slots.map(error_of);
     if b.0 > a.0 { b.1 } else { a.1 }
-}
-
-/// Programs `bytes` at `start`, which may end inside a unit: the rest of it stays blank. Then reads
-/// back.
-///
-/// # Errors
-/// [`Refusal::FlashFailed`].
-#[inline(never)]
-pub fn program<R: NorFlash>(slot: &mut R, start: u32, bytes: &[u8]) -> Result<(), Refusal> {
-    for (address, unit) in (start..).step_by(UNIT).zip(bytes.chunks(UNIT)) {
-        let mut padded = [0xff; UNIT];
-        for (place, &byte) in padded.iter_mut().zip(unit) {
-            *place = byte;
-        }
-        let failed = Refusal::FlashFailed {
-            operation: FlashOperation::Program,
-            address,
-        };
-        slot.write(address, &padded).map_err(|_| failed)?;
-        if read_unit(slot, address)? != padded {
-            return Err(failed);
-        }
-    }
-    Ok(())
-}
-
-fn read_unit<R: ReadNorFlash>(slot: &mut R, address: u32) -> Result<[u8; UNIT], Refusal> {
-    let mut unit = [0; UNIT];
-    slot.read(address, &mut unit)
-        .map_err(|_| Refusal::FlashFailed {
-            operation: FlashOperation::Read,
-            address,
-        })?;
-    Ok(unit)
 }

@@ -7,7 +7,6 @@ use ray_runtime::{OpenError, RayBlob};
 
 use super::{ClientError, DeviceClient, unexpected};
 use ray_device::frame::checksum;
-use ray_device::port::UNIT;
 use ray_device::protocol::{
     Chunk, MAX_CHUNK, NewBlob, Refusal, Reply, Request, Signature, StoredBlob, name,
 };
@@ -251,7 +250,8 @@ impl DeviceClient {
 
     fn chunk_length(&self) -> usize {
         let most = usize::from(self.greeting.max_chunk).min(MAX_CHUNK);
-        (most / UNIT * UNIT).max(UNIT)
+        let unit = usize::from(self.greeting.unit).clamp(1, MAX_CHUNK);
+        (most / unit * unit).max(unit)
     }
 }
 

@@ -1,5 +1,6 @@
 //! The file that a simulated device keeps its flash in: an image of all of it, the same for the
-//! device on the host and the one in QEMU.
+//! device on the host and the one in QEMU. Behind it, where the flash has other rules than the default, stand
+//! those, and for each unit a bit that says whether it was programmed.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -10,11 +11,14 @@ use std::time::{Duration, Instant};
 use ray_runtime::RayBlob;
 use thiserror::Error;
 
-use crate::simulated::sim_flash::{BLOCK, SimFlash};
+use crate::simulated::sim_flash::{Rules, SimFlash};
 use ray_device::frame::checksum;
+use ray_device::port::NoClock;
 use ray_device::protocol::Rig;
-use ray_device::storage::log::{Log, Record};
-use ray_device::storage::{program, rig};
+use ray_device::storage::log::Log;
+use ray_device::storage::record::Record;
+use ray_device::storage::slot::SlotFlash;
+use ray_device::storage::{program_blob, rig};
 
 /// Size of a device's flash, bytes: that of the board which QEMU emulates.
 pub const FLASH_LENGTH: usize = 16 << 20;
@@ -57,6 +61,27 @@ pub enum FlashFileError {
         /// The file.
         path: PathBuf,
     },
+    /// The flash is too short for its rules.
+    #[error(
+        "a flash of {FLASH_LENGTH} bytes has no room for two slots by the rules {rules}: give smaller blocks"
+    )]
+    Rules {
+        /// The rules.
+        rules: Rules,
+    },
+    /// The file is of a flash with other rules.
+    #[error(
+        "the flash file {} was made with the rules {found}, not {given}: leave --flash-rules out, or name another file",
+        path.display()
+    )]
+    OtherRules {
+        /// The file.
+        path: PathBuf,
+        /// Its rules.
+        found: Rules,
+        /// Those given.
+        given: Rules,
+    },
     /// The blob does not fit a slot.
     #[error("a blob of {length} bytes does not fit a slot of the flash, {limit} bytes")]
     TooLong {
@@ -93,10 +118,19 @@ pub struct Kept {
 /// # Errors
 /// [`FlashFileError::Rig`].
 pub fn blank(own: Option<&Rig>) -> Result<SimFlash, FlashFileError> {
-    let flash = SimFlash::blank(FLASH_LENGTH / BLOCK, 0);
-    let mut flash = flash.ok_or(FlashFileError::Rig)?;
+    blank_with(Rules::default(), own)
+}
+
+/// The same with these rules.
+///
+/// # Errors
+/// [`FlashFileError::Rig`], [`FlashFileError::Rules`].
+pub fn blank_with(rules: Rules, own: Option<&Rig>) -> Result<SimFlash, FlashFileError> {
+    let flash = SimFlash::blank_with(rules, FLASH_LENGTH, 0);
+    let mut flash = flash.ok_or(FlashFileError::Rules { rules })?;
     if let Some(own) = own {
-        rig::write(&mut flash.regions().factory, own).map_err(|_| FlashFileError::Rig)?;
+        rig::write(&mut flash.regions().factory, own, &mut NoClock)
+            .map_err(|_| FlashFileError::Rig)?;
     }
     Ok(flash)
 }
@@ -107,27 +141,33 @@ pub fn blank(own: Option<&Rig>) -> Result<SimFlash, FlashFileError> {
 /// # Errors
 /// [`FlashFileError::TooLong`].
 pub fn holding(blob: &[u8], own: Option<&Rig>) -> Result<SimFlash, FlashFileError> {
-    let mut flash = blank(own)?;
+    holding_with(Rules::default(), blob, own)
+}
+
+fn holding_with(rules: Rules, blob: &[u8], own: Option<&Rig>) -> Result<SimFlash, FlashFileError> {
+    let mut flash = blank_with(rules, own)?;
     let stated = RayBlob::stated_len(blob).map_or(blob.len(), |length| length as usize);
     let blob = blob.get(..stated).unwrap_or(blob);
     if blob.is_empty() {
         return Ok(flash);
     }
+    let [slot, _] = &mut flash.regions().slots;
+    let limit = slot.max_blob(0) as usize;
     let too_long = FlashFileError::TooLong {
         length: blob.len(),
-        limit: flash.layout().max_blob() as usize,
+        limit,
     };
-    if blob.len() > flash.layout().max_blob() as usize {
+    if blob.len() > limit {
         return Err(too_long);
     }
-    let [slot, _] = &mut flash.regions().slots;
     let record = Record {
         sequence: 1,
         length: blob.len() as u32,
         checksum: checksum(blob),
+        ..Record::default()
     };
-    program(slot, BLOCK as u32, blob)
-        .and_then(|()| Log::commit(slot, record))
+    program_blob(slot, 0, blob, &mut NoClock)
+        .and_then(|()| Log::commit(slot, &record, &mut NoClock))
         .map_err(|_| too_long)?;
     Ok(flash)
 }
@@ -148,6 +188,18 @@ impl FlashFile {
     /// # Errors
     /// [`FlashFileError`].
     pub fn open(path: &Path, own: Option<&Rig>) -> Result<Self, FlashFileError> {
+        Self::open_with(path, None, own)
+    }
+
+    /// The same with these rules, if any are given: those of a file that exists must be the same.
+    ///
+    /// # Errors
+    /// [`FlashFileError`].
+    pub fn open_with(
+        path: &Path,
+        given: Option<Rules>,
+        own: Option<&Rig>,
+    ) -> Result<Self, FlashFileError> {
         let failed = |source| FlashFileError::Io {
             path: path.to_owned(),
             source,
@@ -159,14 +211,15 @@ impl FlashFile {
         let mut contents = Vec::new();
         file.read_to_end(&mut contents).map_err(failed)?;
         if contents.starts_with(&ray_runtime::format::MAGIC) {
-            let flash = holding(&contents, own)?;
+            let flash = holding_with(given.unwrap_or_default(), &contents, own)?;
             return Ok(Self::in_memory(flash));
         }
-        if !matches!(contents.len(), 0 | FLASH_LENGTH) {
-            return Err(FlashFileError::Unknown {
-                path: path.to_owned(),
-                length: contents.len(),
-            });
+        let unknown = |length| FlashFileError::Unknown {
+            path: path.to_owned(),
+            length,
+        };
+        if !contents.is_empty() && Stored::read(&contents).is_none() {
+            return Err(unknown(contents.len()));
         }
         let locked = File::open(path).map_err(failed)?;
         lock(&locked, path)?;
@@ -176,27 +229,86 @@ impl FlashFile {
         contents.clear();
         file.read_to_end(&mut contents).map_err(failed)?;
         let mut flash = if contents.is_empty() {
-            let flash = blank(own)?;
+            let flash = blank_with(given.unwrap_or_default(), own)?;
             file.seek(SeekFrom::Start(0)).map_err(failed)?;
             file.write_all(flash.contents()).map_err(failed)?;
+            if flash.rules() != Rules::default() {
+                file.write_all(&rules_line(flash.rules())).map_err(failed)?;
+                file.write_all(&flash.programmed()).map_err(failed)?;
+            }
             flash
         } else if own.is_some() {
             return Err(FlashFileError::RigIsSet {
                 path: path.to_owned(),
             });
         } else {
-            SimFlash::with_contents(&contents, 0).ok_or(FlashFileError::Unknown {
-                path: path.to_owned(),
-                length: contents.len(),
-            })?
+            let Stored {
+                rules,
+                image,
+                programmed,
+            } = Stored::read(&contents).ok_or_else(|| unknown(contents.len()))?;
+            if let Some(given) = given
+                && given != rules
+            {
+                return Err(FlashFileError::OtherRules {
+                    path: path.to_owned(),
+                    found: rules,
+                    given,
+                });
+            }
+            SimFlash::with(rules, image, programmed, 0).ok_or_else(|| unknown(contents.len()))?
         };
-        flash.write_through(file);
+        let has_rules = flash.rules() != Rules::default();
+        flash.write_through(file, has_rules.then_some(PROGRAMMED_AT as u64));
         Ok(Self {
             flash,
             kept_in: Some(Kept {
                 path: path.to_owned(),
                 lock: locked,
             }),
+        })
+    }
+}
+
+/// How the line behind an image begins that says its rules.
+const RULES_MAGIC: &str = "flash rules ";
+
+/// Length of that line, bytes.
+const RULES_LENGTH: usize = 256;
+
+/// Where the bits of the units stand behind it.
+const PROGRAMMED_AT: usize = FLASH_LENGTH + RULES_LENGTH;
+
+fn rules_line(rules: Rules) -> Vec<u8> {
+    let text = format!("{RULES_MAGIC}{rules}");
+    format!("{text:<width$}\n", width = RULES_LENGTH - 1).into_bytes()
+}
+
+/// What a file holds.
+struct Stored<'a> {
+    rules: Rules,
+    image: &'a [u8],
+    programmed: Option<&'a [u8]>,
+}
+
+impl<'a> Stored<'a> {
+    fn read(contents: &'a [u8]) -> Option<Self> {
+        let (image, rest) = contents.split_at_checked(FLASH_LENGTH)?;
+        if rest.is_empty() {
+            return Some(Self {
+                rules: Rules::default(),
+                image,
+                programmed: None,
+            });
+        }
+        let (line, programmed) = rest.split_at_checked(RULES_LENGTH)?;
+        let line = str::from_utf8(line).ok()?.trim_end();
+        let rules: Rules = line.strip_prefix(RULES_MAGIC)?.parse().ok()?;
+        let units = FLASH_LENGTH / rules.unit as usize;
+        (programmed.len() == units.div_ceil(8)).then_some(Self {
+            rules,
+            image,
+            programmed: Some(programmed),
         })
     }
 }

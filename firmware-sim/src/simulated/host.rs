@@ -100,7 +100,8 @@ enum Ask {
 
 /// The device, until nobody can ask it any more.
 fn run(mut flash: SimFlash, trust: Trust, asked: &Receiver<Ask>) {
-    let mut device = Device::new("firmware-sim host", HostClock(Instant::now())).taking(trust);
+    let clock = HostClock(Instant::now());
+    let mut device = Device::new("firmware-sim host", clock).taking(trust);
     let mut regions = flash.regions();
     loop {
         let mut epoch = device.epoch(&mut regions);

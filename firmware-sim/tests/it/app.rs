@@ -289,7 +289,12 @@ fn what_cannot_fit_or_is_for_another_rig_is_refused_before_anything_is_erased() 
         serial: name("17"),
         cameras: heapless::Vec::new(),
     };
-    ray_device::storage::rig::write(&mut flash.regions().factory, &own).unwrap();
+    ray_device::storage::rig::write(
+        &mut flash.regions().factory,
+        &own,
+        &mut ray_device::port::NoClock,
+    )
+    .unwrap();
     let mut regions = flash.regions();
     let mut device = Device::new("a device", Stopped);
     let mut device = device.epoch(&mut regions);

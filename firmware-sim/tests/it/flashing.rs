@@ -18,8 +18,8 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use ray_device::frame::{DELIMITER, FrameReader, FrameWriter, checksum};
 use ray_device::protocol::{
-    CameraStatus, Chunk, IDENTITY_LENGTH, NewBlob, Refusal, Reply, Request, Rig, RigPart,
-    SlotState, name,
+    CameraStatus, Chunk, IDENTITY_LENGTH, MAX_CHUNK, NewBlob, Refusal, Reply, Request, Rig,
+    RigPart, SlotState, name,
 };
 
 const OTHER: [u8; IDENTITY_LENGTH] = *b"another identity";
@@ -92,7 +92,7 @@ fn what_is_no_blob_is_refused_here_and_there() {
     let mut send = |bytes: &[u8], identity| {
         let begun = client.begin_update(&announced(bytes, identity)).unwrap();
         assert_eq!(begun, Begun::Receiving { received: 0 });
-        for (offset, chunk) in (0..).step_by(800).zip(bytes.chunks(800)) {
+        for (offset, chunk) in (0..).step_by(MAX_CHUNK).zip(bytes.chunks(MAX_CHUNK)) {
             client.chunk(offset, chunk).unwrap();
         }
         let refusal = refusal(client.finish_update());
@@ -262,7 +262,7 @@ fn fuzzed_frames_during_an_update_do_not_touch_the_active_blob() {
         let mut bytes = Vec::new();
         for _ in 0..100 {
             let offset = random.random_range(0..other.len());
-            let end = other.len().min(offset + random.random_range(0..896_usize));
+            let end = other.len().min(offset + random.random_range(0..=MAX_CHUNK));
             let chunk = Chunk {
                 offset: match random.random_range(0..4) {
                     0 => random.random(),

@@ -2,6 +2,7 @@
 //! that is killed, and as an image in QEMU; what images cost.
 
 mod app;
+mod parts;
 mod power_cuts;
 mod rig;
 mod snapshots;

@@ -42,6 +42,45 @@ pub fn checksum(blob: &[u8]) -> Option<u32> {
     Some(digest.finalize())
 }
 
+/// [`checksum`] from `crc_of_all`, zlib's CRC-32 of all bytes, with a look at the first 16 alone. `None` if there are
+/// fewer.
+///
+/// A CRC of two parts is `crc(first) * x^(8 bytes of second) + crc(second)`, in polynomials over one bit modulo that
+/// of the CRC. So leaving four bytes out of the first part changes it by a multiple of that power.
+pub fn checksum_from_all(blob: &[u8], crc_of_all: u32) -> Option<u32> {
+    let with = CRC.checksum(blob.get(..CRC_OFFSET + 4)?);
+    let without = CRC.checksum(blob.get(..CRC_OFFSET)?);
+    let behind = blob.len().checked_sub(CRC_OFFSET + 4)?;
+    Some(crc_of_all ^ times(with ^ without, x_to_the_8(behind)))
+}
+
+/// `x^(8 n)` modulo the CRC's polynomial; the highest bit is the coefficient of `x^0`.
+fn x_to_the_8(n: usize) -> u32 {
+    let (mut power, mut square, mut left) = (1 << 31, 1 << 23, n);
+    while left != 0 {
+        if left & 1 == 1 {
+            power = times(power, square);
+        }
+        square = times(square, square);
+        left >>= 1;
+    }
+    power
+}
+
+/// The product modulo the CRC's polynomial.
+fn times(a: u32, mut b: u32) -> u32 {
+    let polynomial = CRC_32_ISO_HDLC.poly.reverse_bits();
+    let mut product = 0;
+    for bit in (0..u32::BITS).rev() {
+        if a >> bit & 1 == 1 {
+            product ^= b;
+        }
+        // Times x.
+        b = b >> 1 ^ if b & 1 == 1 { polynomial } else { 0 };
+    }
+    product
+}
+
 /// `length` rounded up to a multiple of [`ALIGNMENT`].
 pub const fn aligned(length: usize) -> usize {
     length.saturating_add(ALIGNMENT - 1) & !(ALIGNMENT - 1)
@@ -108,7 +147,10 @@ pub const fn mask_len(cells: [u32; 2]) -> usize {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
     use super::*;
+    use std::vec::Vec;
 
     #[test]
     fn checksum_is_the_one_of_zlib() {
@@ -119,6 +161,17 @@ mod tests {
         );
         assert_eq!(CRC.checksum(b"123456789"), 0xcbf4_3926);
         assert_eq!(checksum(b"123456789abc???"), None);
+    }
+
+    #[test]
+    fn the_checksum_follows_from_that_of_all_bytes() {
+        for length in [16, 17, 24, 255, 256, 5704] {
+            let bytes: Vec<u8> = (0..length).map(|k: u32| (k * k >> 3) as u8).collect();
+            let all = CRC.checksum(&bytes);
+            assert_eq!(checksum_from_all(&bytes, all), checksum(&bytes));
+            assert_ne!(checksum_from_all(&bytes, all ^ 1), checksum(&bytes));
+        }
+        assert_eq!(checksum_from_all(&[0; 15], 0), None);
     }
 
     #[test]

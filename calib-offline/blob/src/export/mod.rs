@@ -6,8 +6,10 @@
 mod c_array;
 mod hex;
 mod uf2;
+mod uf2_family;
 
-pub use uf2::BLOCK_LEN as UF2_BLOCK_LEN;
+pub use uf2::{BLOCK_LEN as UF2_BLOCK_LEN, Uf2, filled_len as uf2_filled_len};
+pub use uf2_family::{Family, UnknownFamily};
 
 use calib_rays::remedy::Remedy;
 /// The form to write.
@@ -19,12 +21,7 @@ pub enum Form {
         base_address: u32,
     },
     /// UF2, for bootloaders that show up as a drive.
-    Uf2 {
-        /// Where the blob goes in the device's memory.
-        base_address: u32,
-        /// The number of the family of devices that may take it.
-        family: Option<u32>,
-    },
+    Uf2(Uf2),
     /// The bytes of the blob.
     Binary,
     /// C source that defines an array and its length.
@@ -66,6 +63,47 @@ pub enum ExportError {
         /// The form asked for.
         form: &'static str,
     },
+    /// A place in the flash of Raspberry Pi's parts, whose boot ROM leaves blocks without a family alone.
+    #[error(
+        "at {address:#x} is the flash of an RP2040 or RP2350, which ignores a UF2 file that names no family"
+    )]
+    NoFamily {
+        /// As asked for.
+        address: u32,
+    },
+    /// The boot ROM would erase and write different places.
+    #[error(
+        "the base address {address:#x} is not the start of a flash sector of 4096 bytes: the boot ROM would erase what it has written"
+    )]
+    NotASector {
+        /// As asked for.
+        address: u32,
+        /// Where its sector starts.
+        below: u32,
+        /// Where the next one starts.
+        above: u32,
+    },
+    /// The family's flash is elsewhere, or ends before.
+    #[error("{length} bytes at {address:#x} are not in the flash of {family}, which is at 0x10000000 to {:#x}", .end - 1)]
+    NotInFlash {
+        /// As asked for.
+        address: u32,
+        /// Bytes to place there, whole sectors.
+        length: usize,
+        /// Whose flash.
+        family: Family,
+        /// Behind its last byte.
+        end: u32,
+    },
+    /// Only RP2350 need an absolute block.
+    #[error("only families of the RP2350 take an absolute block")]
+    NeedlessAbsoluteBlock,
+    /// The blob covers the place of the absolute block.
+    #[error("the absolute block goes to {address:#x}, which the file writes, too")]
+    OnAbsoluteBlock {
+        /// Its address.
+        address: u32,
+    },
     /// An option that the form has no place for.
     #[error("the form {form} has no place for {option}")]
     NeedlessOption {
@@ -92,6 +130,23 @@ impl Remedy for ExportError {
                     .to_owned()
             }
             Self::NeedlessOption { option, .. } => format!("leave {option} out"),
+            Self::NoFamily { .. } => {
+                "give --family rp2040, or rp2350-arm-s or rp2350-riscv, or data or absolute for an RP2350 with a partition table"
+                    .to_owned()
+            }
+            Self::NotASector { below, above, .. } => format!(
+                "give --base-address {above:#x}, or {below:#x}; what else stands in the sectors of the blob is erased in any case"
+            ),
+            Self::NotInFlash { .. } => {
+                "choose a --base-address there, or the --family of the part that the file is for".to_owned()
+            }
+            Self::NeedlessAbsoluteBlock => {
+                "leave --absolute-block out, or give a --family of the RP2350, such as rp2350-arm-s"
+                    .to_owned()
+            }
+            Self::OnAbsoluteBlock { .. } => {
+                "choose another --base-address, or leave --absolute-block out: only RP2350 of stepping A2 need it".to_owned()
+            }
         };
         Some(text)
     }
@@ -107,14 +162,7 @@ pub fn file(blob: &[u8], form: &Form) -> Result<Vec<u8>, ExportError> {
             check_address(*base_address, ALIGNMENT, blob.len())?;
             Ok(hex::file(blob, *base_address))
         }
-        Form::Uf2 {
-            base_address,
-            family,
-        } => {
-            let length = blob.len().next_multiple_of(uf2::PAYLOAD_LEN);
-            check_address(*base_address, uf2::PAYLOAD_LEN as u32, length)?;
-            Ok(uf2::file(blob, *base_address, *family))
-        }
+        Form::Uf2(uf2) => uf2::file(blob, uf2),
         Form::Binary => Ok(blob.to_vec()),
         Form::C { name } if c_array::is_name(name) => Ok(c_array::file(blob, name)),
         Form::C { name } => Err(ExportError::BadName { name: name.clone() }),
@@ -135,3 +183,5 @@ fn check_address(address: u32, multiple: u32, length: usize) -> Result<(), Expor
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod uf2_tests;

@@ -67,34 +67,6 @@ fn hex_holds_the_blob_at_its_address() {
 }
 
 #[test]
-fn uf2_holds_the_blob_at_its_address() {
-    let blob = &blob()[..1000];
-    for family in [None, Some(0xe48b_ff56)] {
-        let base_address = 0x1010_0000;
-        let form = Form::Uf2 {
-            base_address,
-            family,
-        };
-        let file = file(blob, &form).unwrap();
-        assert_eq!(file.len(), 4 * UF2_BLOCK_LEN);
-        let mut memory: Vec<u8> = Vec::new();
-        for (number, block) in file.chunks(UF2_BLOCK_LEN).enumerate() {
-            let word = |at: usize| u32::from_le_bytes(block[at..at + 4].try_into().unwrap());
-            assert_eq!(block[..8], *b"UF2\n\x57\x51\x5d\x9e");
-            assert_eq!(word(508), 0x0ab1_6f30);
-            assert_eq!(word(8), if family.is_some() { 0x2000 } else { 0 });
-            assert_eq!(word(12) as usize, base_address as usize + memory.len());
-            assert_eq!((word(16), word(20), word(24)), (256, number as u32, 4));
-            assert_eq!(word(28), family.unwrap_or(0));
-            memory.extend(&block[32..288]);
-            assert!(block[288..508].iter().all(|byte| *byte == 0));
-        }
-        assert_eq!(memory[..1000], *blob);
-        assert!(memory[1000..].iter().all(|byte| *byte == 0xff));
-    }
-}
-
-#[test]
 fn a_c_array_holds_the_blob() {
     let blob = &blob()[..1000];
     let form = Form::C {
@@ -121,24 +93,10 @@ fn raw_bytes_are_the_blob() {
 fn what_no_device_could_use_is_refused() {
     let blob = blob();
     let hex = |base_address| file(&blob, &Form::Hex { base_address }).err();
-    let uf2 = |base_address| {
-        let family = None;
-        file(
-            &blob,
-            &Form::Uf2 {
-                base_address,
-                family,
-            },
-        )
-        .err()
-    };
     let misaligned = |address, multiple| Some(ExportError::Misaligned { address, multiple });
     assert_eq!(hex(0x0800_0004), misaligned(0x0800_0004, 8));
-    assert_eq!(uf2(0x1010_0008), misaligned(0x1010_0008, 256));
     let too_high = |address, length| Some(ExportError::TooHigh { address, length });
     assert_eq!(hex(0xffff_0000), too_high(0xffff_0000, 200_008));
-    // Whole pages.
-    assert_eq!(uf2(0xffff_f000), too_high(0xffff_f000, 200_192));
     for name in [
         "", "2rig", "my rig", "rig-2", "r\u{f6}", "int", "_rig", "a;b",
     ] {

@@ -28,17 +28,17 @@ fn framed(checked: &[u8]) -> Vec<u8> {
 }
 
 /// The bytes of a Hello, computed by hand but for the checksum, which is Python's
-/// `zlib.crc32(b"\3\7\0\0")`.
+/// `zlib.crc32(b"\4\7\0\0")`.
 #[test]
 fn the_bytes_of_a_hello() {
-    let crc = super::CHECKSUM.checksum(&[3, 7, 0, 0]).to_le_bytes();
+    let crc = super::CHECKSUM.checksum(&[4, 7, 0, 0]).to_le_bytes();
     assert_eq!(crc, HELLO_CRC);
-    let mut expected = vec![3, 3, 7, 1, 5];
+    let mut expected = vec![3, 4, 7, 1, 5];
     expected.extend_from_slice(&crc);
     expected.push(0);
     assert_eq!(sealed(7, &Request::Hello), expected);
 }
-const HELLO_CRC: [u8; 4] = [0x77, 0x66, 0xbe, 0x36];
+const HELLO_CRC: [u8; 4] = [0xce, 0x5e, 0x69, 0xab];
 
 #[test]
 fn a_request_comes_back() {

@@ -3,6 +3,8 @@
 use ray_runtime::MatchNoise;
 use serde::{Deserialize, Serialize};
 
+use crate::storage::OTHER_PART;
+
 /// Why a frame or a request was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Refusal {
@@ -144,6 +146,9 @@ impl core::fmt::Display for Refusal {
                     2 => "its flash holds no blob",
                     3 => "the blob in its flash is of a version that it does not read",
                     5 => "the blob in its flash is damaged",
+                    OTHER_PART => {
+                        "its slot was written for another part, with another program unit or erase block"
+                    }
                     _ => "the blob in its flash cannot be opened",
                 };
                 write!(out, "{reason} (code {open_error}): flash one first")

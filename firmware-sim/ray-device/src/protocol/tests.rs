@@ -202,13 +202,16 @@ fn bytes_of_answers() {
         device: name("ab"),
         firmware: name("0.1"),
         max_matches: 28,
-        max_chunk: 896,
+        max_chunk: 512,
         max_blob: 5,
+        unit: 8,
         needs_signature: true,
     };
     assert_bytes(
         &Reply::Hello(hello),
-        &[1, 2, b'a', b'b', 3, b'0', b'.', b'1', 28, 0x80, 0x07, 5, 1],
+        &[
+            1, 2, b'a', b'b', 3, b'0', b'.', b'1', 28, 0x80, 0x04, 5, 8, 1,
+        ],
     );
 
     let without = Status {
@@ -341,6 +344,7 @@ fn the_longest_messages_fit_a_frame() {
         max_matches: u8::MAX,
         max_chunk: u16::MAX,
         max_blob: u32::MAX,
+        unit: u16::MAX,
         needs_signature: true,
     };
     let refusal = Refusal::WrongVersion {

@@ -7,8 +7,10 @@
 
 use ray_runtime::RayBlob;
 
+use super::access;
+use super::layout::aligned;
 use crate::frame::{MAX_MESSAGE, checksum};
-use crate::port::MappedFlash;
+use crate::port::{Clock, Flash};
 use crate::protocol::{Refusal, Rig, RigPart};
 
 const MAGIC: [u8; 4] = *b"RigF";
@@ -16,13 +18,20 @@ const HEAD_LENGTH: usize = 12;
 
 /// The factory record at the start of this region, if there is a whole one.
 #[inline(never)]
-pub fn read<R: MappedFlash>(factory: &R) -> Option<Rig> {
-    let (head, rest) = factory.mapped().split_first_chunk::<HEAD_LENGTH>()?;
-    let &[a, b, c, d, l0, l1, l2, l3, s0, s1, s2, s3] = head;
+pub fn read<R: Flash>(factory: &mut R) -> Option<Rig> {
+    let mut record = [0; aligned((HEAD_LENGTH + MAX_MESSAGE) as u32, 8) as usize];
+    if factory.is_blank(0, factory.geometry().line()).ok()? {
+        return None;
+    }
+    // Reads are whole multiples of 8 from the start, which every driver takes.
+    access::read(factory, 0, record.first_chunk_mut::<16>()?).ok()?;
+    let &[a, b, c, d, l0, l1, l2, l3, s0, s1, s2, s3] = record.first_chunk()?;
     if [a, b, c, d] != MAGIC {
         return None;
     }
-    let message = rest.get(..u32::from_le_bytes([l0, l1, l2, l3]) as usize)?;
+    let end = u32::from_le_bytes([l0, l1, l2, l3]).saturating_add(HEAD_LENGTH as u32);
+    access::read(factory, 0, record.get_mut(..aligned(end, 8) as usize)?).ok()?;
+    let message = record.get(HEAD_LENGTH..end as usize)?;
     if checksum(message) != u32::from_le_bytes([s0, s1, s2, s3]) {
         return None;
     }
@@ -33,7 +42,7 @@ pub fn read<R: MappedFlash>(factory: &R) -> Option<Rig> {
 ///
 /// # Errors
 /// [`Refusal::FlashFailed`].
-pub fn write<R: MappedFlash>(factory: &mut R, rig: &Rig) -> Result<(), Refusal> {
+pub fn write<R: Flash, C: Clock>(factory: &mut R, rig: &Rig, clock: &mut C) -> Result<(), Refusal> {
     let mut record = [0; HEAD_LENGTH + MAX_MESSAGE];
     let (head, message) = record.split_at_mut(HEAD_LENGTH);
     // It is part of every status, which fits such a buffer.
@@ -45,7 +54,7 @@ pub fn write<R: MappedFlash>(factory: &mut R, rig: &Rig) -> Result<(), Refusal> 
         *place = byte;
     }
     let record = record.get(..HEAD_LENGTH + length).unwrap_or_default();
-    super::program(factory, 0, record)
+    access::program(factory, 0, record, clock)
 }
 
 /// Compares a blob with the device's cameras: how many, and of each in order the name and the size

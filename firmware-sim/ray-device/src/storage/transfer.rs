@@ -1,14 +1,15 @@
 //! A blob on its way into the inactive slot.
 
-use embedded_storage::nor_flash::NorFlash;
 use ray_runtime::OpenError;
 use ray_runtime::format::HEADER_LEN;
 
-use super::log::{Log, Record, erase_block};
+use super::log::{Log, erase_log};
+use super::record::{Claims, Record};
+use super::slot::SlotFlash;
 use super::trust::Trust;
-use super::{blob_bytes, blob_of, max_blob, program, rig};
-use crate::port::{MappedFlash, UNIT};
-use crate::protocol::{Chunk, FlashOperation, NewBlob, Refusal, Rig, RigPart, UpdateStatus};
+use super::{blob_bytes, open_verified, program_blob, read_blob, rig, stored_checksum};
+use crate::port::Clock;
+use crate::protocol::{Chunk, NewBlob, Refusal, Rig, RigPart, UpdateStatus};
 
 /// Who asks: one number for each link, or each connection.
 pub type Peer = u32;
@@ -52,14 +53,14 @@ impl Transfer {
     /// # Errors
     /// [`Refusal::TooLong`], [`Refusal::NotABlob`], [`Refusal::OtherRig`], [`Refusal::NotSigned`],
     /// [`Refusal::FlashFailed`].
-    pub fn begin<R: NorFlash>(
-        slot: &mut R,
+    pub fn begin<S: SlotFlash, C: Clock>(
+        slot: &mut S,
         new: &NewBlob,
         peer: Peer,
         owner: &Owner<'_>,
-        now_ms: u64,
+        clock: &mut C,
     ) -> Result<Self, Refusal> {
-        let limit = max_blob(slot);
+        let limit = slot.max_blob(0);
         if new.length > limit {
             return Err(Refusal::TooLong { limit });
         }
@@ -85,13 +86,13 @@ impl Transfer {
         if owner.trust.needs_signature() && new.signature.is_none() {
             return Err(Refusal::NotSigned);
         }
-        erase_block(slot, 0)?;
+        erase_log(slot, clock)?;
         Ok(Self {
             new: new.clone(),
             peer,
             received: 0,
             last_offset: 0,
-            last_active_ms: now_ms,
+            last_active_ms: clock.uptime_ms(),
         })
     }
 
@@ -148,13 +149,13 @@ impl Transfer {
     /// [`Refusal::WrongOffset`] and [`Refusal::BadChunk`], after which the transfer can go on;
     /// [`Refusal::FlashFailed`], after which it cannot.
     #[inline(never)]
-    pub fn store<R: MappedFlash>(
+    pub fn store<S: SlotFlash, C: Clock>(
         &mut self,
-        slot: &mut R,
+        slot: &mut S,
         chunk: &Chunk,
-        now_ms: u64,
+        clock: &mut C,
     ) -> Result<u32, Refusal> {
-        self.last_active_ms = now_ms;
+        self.last_active_ms = clock.uptime_ms();
         if chunk.offset != self.received {
             if self.is_repeat(slot, chunk) {
                 return Ok(self.received);
@@ -167,32 +168,29 @@ impl Transfer {
         let missing = self.new.length.saturating_sub(self.received);
         if length == 0
             || length > missing
-            || (length < missing && !length.is_multiple_of(UNIT as u32))
+            || (length < missing && length & slot.shape().blob.line().saturating_sub(1) != 0)
         {
             return Err(Refusal::BadChunk { missing });
         }
-        let block = R::ERASE_SIZE as u32;
-        let start = block.saturating_add(chunk.offset);
-        let end = start.saturating_add(length);
-        // Each block is erased when the first byte for it comes.
-        let mut boundary = start.next_multiple_of(block);
-        while boundary < end {
-            erase_block(slot, boundary)?;
-            boundary = boundary.saturating_add(block);
-        }
-        program(slot, start, &chunk.bytes)?;
+        program_blob(slot, chunk.offset, &chunk.bytes, clock)?;
         self.last_offset = chunk.offset;
         self.received = self.received.saturating_add(length);
         Ok(self.received)
     }
 
     /// Whether this chunk is the one stored last, sent again because its answer was lost.
-    fn is_repeat<R: MappedFlash>(&self, slot: &R, chunk: &Chunk) -> bool {
+    fn is_repeat<S: SlotFlash>(&self, slot: &mut S, chunk: &Chunk) -> bool {
         let end = chunk.offset.saturating_add(chunk.bytes.len() as u32);
-        let stored = blob_bytes(slot, self.received).unwrap_or_default();
-        chunk.offset == self.last_offset
-            && end == self.received
-            && stored.get(chunk.offset as usize..) == Some(&chunk.bytes)
+        if chunk.offset != self.last_offset || end != self.received {
+            return false;
+        }
+        (chunk.offset..)
+            .step_by(8)
+            .zip(chunk.bytes.chunks(8))
+            .all(|(offset, bytes)| {
+                let mut stored = [0; 8];
+                read_blob(slot, offset, &mut stored).is_ok() && stored.starts_with(bytes)
+            })
     }
 
     /// Checks all that was stored: read back through the driver, then opened in place with every
@@ -202,17 +200,18 @@ impl Transfer {
     /// # Errors
     /// [`Refusal::Incomplete`], after which the transfer can go on; otherwise why it cannot be taken.
     #[inline(never)]
-    pub fn check<R: MappedFlash>(
+    pub fn check<S: SlotFlash, C: Clock>(
         &self,
-        slot: &mut R,
+        slot: &mut S,
         owner: &Owner<'_>,
+        clock: &mut C,
     ) -> Result<Checked, Refusal> {
         if self.received < self.new.length {
             return Err(Refusal::Incomplete {
                 received: self.received,
             });
         }
-        let stored = stored_checksum(slot, self.new.length)?;
+        let stored = stored_checksum(slot, self.new.length, clock)?;
         if stored != self.new.checksum {
             return Err(Refusal::ChecksumMismatch {
                 announced: self.new.checksum,
@@ -220,11 +219,11 @@ impl Transfer {
             });
         }
         let record = Record {
-            sequence: 0,
             length: self.new.length,
             checksum: stored,
+            ..Record::default()
         };
-        let blob = blob_of(slot, record).map_err(|error| Refusal::NotABlob {
+        let blob = open_verified(slot, &record).map_err(|error| Refusal::NotABlob {
             open_error: error.code(),
         })?;
         if *blob.identity() != self.new.identity {
@@ -233,7 +232,7 @@ impl Transfer {
         if let Some(own) = owner.rig {
             rig::compare(&blob, own)?;
         }
-        let bytes = blob_bytes(slot, self.new.length).unwrap_or_default();
+        let bytes = blob_bytes(slot, &record).unwrap_or_default();
         owner.trust.check(bytes, self.new.signature.as_ref())?;
         Ok(Checked {
             length: self.new.length,
@@ -247,36 +246,22 @@ impl Checked {
     ///
     /// # Errors
     /// [`Refusal::LogFull`] if there is no number left, [`Refusal::FlashFailed`].
-    pub fn commit<R: NorFlash>(self, slot: &mut R, sequence: Option<u32>) -> Result<u32, Refusal> {
+    pub fn commit<S: SlotFlash, C: Clock>(
+        self,
+        slot: &mut S,
+        sequence: Option<u32>,
+        claims: Claims,
+        clock: &mut C,
+    ) -> Result<u32, Refusal> {
         let sequence = sequence.ok_or(Refusal::LogFull)?;
         let record = Record {
             sequence,
             length: self.length,
             checksum: self.checksum,
+            manifest_length: 0,
+            claims,
         };
-        Log::commit(slot, record)?;
+        Log::commit(slot, &record, clock)?;
         Ok(sequence)
     }
-}
-
-/// The checksum of the blob as the driver reads it.
-fn stored_checksum<R: NorFlash>(slot: &mut R, length: u32) -> Result<u32, Refusal> {
-    let mut sum = crate::frame::RunningChecksum::default();
-    let mut piece = [0; 256];
-    let mut at = 0;
-    while at < length {
-        let address = (R::ERASE_SIZE as u32).saturating_add(at);
-        let wanted = (length - at).min(piece.len() as u32);
-        let Some(piece) = piece.get_mut(..wanted as usize) else {
-            break;
-        };
-        slot.read(address, piece)
-            .map_err(|_| Refusal::FlashFailed {
-                operation: FlashOperation::Read,
-                address,
-            })?;
-        sum.add(piece);
-        at = at.saturating_add(wanted);
-    }
-    Ok(sum.finish())
 }

@@ -8,6 +8,7 @@ use tempfile::NamedTempFile;
 
 use super::error::QemuError;
 use crate::simulated::flash_file::{FLASH_LENGTH, FlashFile, Kept};
+use crate::simulated::sim_flash::Rules;
 
 /// Where the emulated flash starts in the board's memory.
 const FLASH_START: usize = 0x2100_0000;
@@ -21,6 +22,17 @@ pub enum Backing {
 
 impl Backing {
     pub fn of(FlashFile { flash, kept_in }: FlashFile) -> std::io::Result<Self> {
+        if flash.rules() != Rules::default() {
+            let message = format!(
+                "the flash in QEMU has the rules {}, and that of the file {}: name another file, or run it on the host",
+                Rules::default(),
+                flash.rules()
+            );
+            return Err(std::io::Error::new(
+                std::io::ErrorKind::InvalidInput,
+                message,
+            ));
+        }
         if let Some(kept) = kept_in {
             return Ok(Self::Kept(kept));
         }
