@@ -70,7 +70,11 @@ pub fn cost_of_blob(
                 failed,
             });
         }
-        let Some(spread) = Spread::of(answered.iter().map(|record| work.each(instructions(record) - overhead))) else {
+        let Some(spread) = Spread::of(
+            answered
+                .iter()
+                .map(|record| work.each(instructions(record) - overhead)),
+        ) else {
             continue;
         };
         let camera = work.camera.and_then(|k| asked.cameras.get(k));

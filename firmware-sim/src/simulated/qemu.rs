@@ -191,16 +191,22 @@ pub fn build_soft_float_image(image: &str) -> Result<PathBuf, QemuError> {
     Ok(image_of(SOFT_FLOAT_TARGET, image))
 }
 
-/// Builds the image of this name without what reads blobs of old versions, and returns where it is.
+/// Builds the image of this name with these features alone, separated by commas, and returns where it is.
 ///
 /// # Errors
 /// As [`build_image`].
-pub fn build_newest_only_image(image: &str) -> Result<PathBuf, QemuError> {
-    let folder = root().join("target/embedded/newest-only");
+pub fn build_image_with(image: &str, features: &str) -> Result<PathBuf, QemuError> {
+    let folder = root().join("target/embedded/only").join(features);
     let folder_argument = folder.display().to_string();
     build(
         &[image],
-        &["--no-default-features", "--target-dir", &folder_argument],
+        &[
+            "--no-default-features",
+            "--features",
+            features,
+            "--target-dir",
+            &folder_argument,
+        ],
         &[],
     )?;
     Ok(folder.join(TARGET).join("release").join(image))
