@@ -92,15 +92,12 @@ impl Views<'_> {
         if HAS_PATCHES && record.encoding() == CENTRAL_PATCHES {
             let [s] = self.patch::<1, f32>(record, places)?;
             Ok(central_ray(Pose::of(record), s))
-        } else if HAS_QUANTIZED && record.encoding() > NON_CENTRAL_PATCHES {
-            let [u, v] = places.map(|place| place.from_edge_px);
-            quantized::lookup(self.pairs, record, PixelPoint::new(u, v))
         } else {
             self.lookup_other(record, pixel)
         }
     }
 
-    /// The ray of a calibrated pixel from a table of yet another form.
+    /// The ray of a calibrated pixel from a table of another form.
     #[inline(never)]
     fn lookup_other(&self, record: Record<'_>, pixel: PixelPoint) -> Result<Ray, LookupError> {
         if HAS_PATCHES && record.encoding() == NON_CENTRAL_PATCHES {
@@ -108,6 +105,8 @@ impl Views<'_> {
             Ok(shifted_ray(Pose::of(record), Sample { s, n }))
         } else if is_spline(record) {
             lookup_spline(self.pairs, record, pixel)
+        } else if HAS_QUANTIZED {
+            quantized::lookup(self.pairs, record, from_edge(record, pixel))
         } else {
             // Never: `open` refuses what is left out.
             Err(LookupError::Outside)

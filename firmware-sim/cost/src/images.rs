@@ -24,7 +24,8 @@ pub trait Images {
     /// Where the image of this name is once it has been built.
     fn path(&self, name: &str) -> PathBuf;
 
-    /// Builds the image of this name with these features of the runtime alone, and returns where it is.
+    /// Builds the image of this name with these features of the runtime alone, and returns where it is until
+    /// another one is built so.
     ///
     /// # Errors
     /// As [`Images::build`].

@@ -191,12 +191,13 @@ pub fn build_soft_float_image(image: &str) -> Result<PathBuf, QemuError> {
     Ok(image_of(SOFT_FLOAT_TARGET, image))
 }
 
-/// Builds the image of this name with these features alone, separated by commas, and returns where it is.
+/// Builds the image of this name with these features alone, separated by commas, and returns where it is until
+/// another one is built so.
 ///
 /// # Errors
 /// As [`build_image`].
 pub fn build_image_with(image: &str, features: &str) -> Result<PathBuf, QemuError> {
-    let folder = root().join("target/embedded/only").join(features);
+    let folder = root().join("target/embedded/only");
     let folder_argument = folder.display().to_string();
     build(
         &[image],
