@@ -18,6 +18,8 @@ mod epipolar_row;
 mod error;
 pub mod format;
 mod grid;
+#[cfg(feature = "integer")]
+pub mod integer;
 mod knots;
 mod lookup;
 mod mask;
@@ -28,6 +30,7 @@ mod polynomial;
 mod project;
 mod quantized;
 mod ray;
+mod rounding;
 mod row;
 mod self_test;
 mod sensor_window;
@@ -45,6 +48,7 @@ pub use error::{LookupError, MeasureError, OpenError, ProjectError, ReadoutError
 pub use match_noise::MatchNoise;
 pub use project::{EpipolarCurve, EpipolarPoint};
 pub use ray::{PixelPoint, Ray};
+pub use rounding::Rounding;
 pub use row::{Matched, Row, RowPoint};
 pub use self_test::{SelfTestFailure, SelfTests};
 pub use sensor_window::{Readout, SensorWindow};

@@ -1,6 +1,78 @@
 //! What the application needs from the machine it runs on: a byte stream, flash, and a clock.
 //!
 //! A board implements these with a UART, memory-mapped flash and a timer; a test with whatever it likes.
+//!
+//! # What a flash driver owes
+//! The storage keeps a blob through any cut of power if the driver keeps these. None of it can be checked by the compiler.
+//!
+//! - **A read that fails is an `Err`, never a fault and never garbage that reads as good.** On parts with ECC, a
+//!   word that was being programmed or erased when power went raises an interrupt or a fault when it is read; on some, a
+//!   blank word does. Every start reads both logs, so a driver that merely copies faults at *every* start from
+//!   then on. How to catch it stands below.
+//! - **`mapped` is looked at only after `read` took the same bytes without an error** in the same life of the
+//!   device. Whoever implements [`MappedFlash`] touches the memory in no other way either: no prefetching copy, no
+//!   checksum unit or DMA over a whole slot.
+//! - **Caches.** `write` and `erase` return when the flash is done, and when no data cache, prefetch buffer or flash
+//!   accelerator holds what stood there before: invalidate the range (i.MX RT, STM32H7 and F7: D-cache by address;
+//!   STM32F4, L4, G4: reset the flash's data cache; ESP32, RP2040 and RP2350: the XIP cache; MCX: the LPCAC).
+//! - **Nobody reads a chip that cannot be read while it is written**: not this region, not another region of the
+//!   same chip or bank, not the second core, no interrupt handler, no DMA. The borrow checker guards one region, not
+//!   the chip. On RP2040, RP2350 and ESP32 park the other core, mask interrupts, and run from RAM; on one-bank parts
+//!   of STM32 the core stalls by itself; on dual-bank parts put both slots into the bank that the code is not in.
+//! - **Memory-mapped mode** (QSPI, OSPI, XSPI, FlexSPI): the driver leaves it for `write` and `erase`, and has entered
+//!   it again when they return, with the same mapping. A reset while it was left must find the chip in a mode that the boot
+//!   ROM can read.
+//! - **Long erases.** A sector of 128 KiB takes up to seconds. [`Clock::step`] is called before each block, never
+//!   inside one: the watchdog's time must be longer than one `erase` of one block, or the driver feeds it while it waits.
+//! - **Units are programmed once between two erases.** A driver that pads a shorter write to its page by reading
+//!   and programming again breaks that: give its page as `WRITE_SIZE`, or write part of it where the chip allows.
+//! - **In order.** `write` and `erase` have been carried out when they return; no queue, no write-back.
+//!
+//! ## ECC faults on a Cortex-M
+//! Sketches after the vendors' reference manuals, not run on silicon; registers differ from part to part.
+//!
+//! STM32L4, L5, G4, WB, U5 (`FLASH_ECCR`) and H5 (`FLASH_ECCDETR`): a double error raises the NMI. The handler notes
+//! it and clears the flag, the load goes on with whatever it got, and the driver looks afterwards:
+//! ```text
+//! static IS_UNREADABLE: AtomicBool = AtomicBool::new(false);
+//!
+//! #[exception]
+//! unsafe fn NonMaskableInt() {
+//!     if FLASH.eccr().read().eccd() {                  // bit 31: two wrong bits; written 1, it is cleared
+//!         FLASH.eccr().modify(|bits| bits.set_eccd(true));
+//!         IS_UNREADABLE.store(true, Relaxed);
+//!     } else {
+//!         reset();                                     // the clock security system, or a pin: not ours
+//!     }
+//! }
+//!
+//! fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
+//!     IS_UNREADABLE.store(false, Relaxed);
+//!     copy_volatile(self.start + offset, bytes);
+//!     dsb();                                           // the NMI has been taken by now
+//!     if IS_UNREADABLE.load(Relaxed) { Err(Error::Ecc) } else { Ok(()) }
+//! }
+//! ```
+//! STM32H7: the load itself gives a bus fault. Copy at the priority of a hard fault, with bus faults ignored, and ask
+//! the flash afterwards (or copy by DMA, which gets a transfer error in place of a fault):
+//! ```text
+//! fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
+//!     critical_section(|| {
+//!         FLASH.ccr().write(|bits| bits.set_clr_dbeccerr(true));
+//!         faultmask::set();                            // priority -1
+//!         SCB.ccr.modify(|ccr| ccr | BFHFNMIGN);       // data bus faults are ignored there
+//!         dsb(); isb();
+//!         copy_volatile(self.start + offset, bytes);
+//!         dsb();
+//!         SCB.ccr.modify(|ccr| ccr & !BFHFNMIGN);
+//!         faultmask::clear();
+//!         SCB.cfsr.write(BUS_FAULTS);                  // written 1, they are cleared
+//!         if FLASH.sr().read().dbeccerr() { Err(Error::Ecc) } else { Ok(()) }
+//!     })
+//! }
+//! ```
+//! With the D-cache on, invalidate the range first, else the cache answers for the flash. LPC55: ask the flash
+//! controller (margin check) for blank and unreadable words before the load, in `read` and in [`Flash::is_blank`].
 
 use embedded_storage::nor_flash::NorFlash;
 
@@ -25,6 +97,7 @@ pub trait Link {
 
 /// What a flash is programmed and erased in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Geometry {
     /// Bytes that are programmed at once, each unit once between two erases: a power of two, at most
     /// [`Geometry::MAX_UNIT`].
@@ -81,7 +154,7 @@ pub trait Flash: NorFlash {
 
     /// What it is programmed and erased in. A driver that finds it out when it starts, such as one that asks
     /// a chip on a bus, says so here; its constants then are the least of what it may find.
-    #[inline(always)]
+    #[inline]
     fn geometry(&self) -> Geometry {
         Geometry::of::<Self>()
     }
@@ -92,31 +165,44 @@ pub trait Flash: NorFlash {
     ///
     /// # Errors
     /// If that cannot be told: the bytes then count as programmed.
-    #[inline(never)]
+    #[inline(always)]
     fn is_blank(&mut self, start: u32, length: u32) -> Result<bool, Self::Error> {
-        let erased = self.geometry().erased;
-        let end = start.saturating_add(length);
-        let mut at = start;
-        let mut piece = [0; 64];
-        while at < end {
-            let wanted = (end - at).min(piece.len() as u32);
-            let Some(piece) = piece.get_mut(..wanted as usize) else {
-                break;
-            };
-            self.read(at, piece)?;
-            if piece.iter().any(|&byte| byte != erased) {
-                return Ok(false);
-            }
-            at = at.saturating_add(wanted);
-        }
-        Ok(true)
+        reads_as_erased(self, start, length)
     }
 
     /// Where the region starts in the device's flash, for messages.
-    #[inline(always)]
+    #[inline]
     fn start(&self) -> u32 {
         0
     }
+}
+
+/// Whether these bytes read as erased: [`Flash::is_blank`] of a part whose blank words can be read.
+///
+/// # Errors
+/// If the driver cannot read them.
+#[inline(never)]
+pub fn reads_as_erased<R: Flash + ?Sized>(
+    flash: &mut R,
+    start: u32,
+    length: u32,
+) -> Result<bool, R::Error> {
+    let erased = flash.geometry().erased;
+    let end = start.saturating_add(length);
+    let mut at = start;
+    let mut piece = [0; 64];
+    while at < end {
+        let wanted = (end - at).min(piece.len() as u32);
+        let Some(piece) = piece.get_mut(..wanted as usize) else {
+            break;
+        };
+        flash.read(at, piece)?;
+        if piece.iter().any(|&byte| byte != erased) {
+            return Ok(false);
+        }
+        at = at.saturating_add(wanted);
+    }
+    Ok(true)
 }
 
 /// Flash that can also be read like memory.
@@ -147,8 +233,8 @@ pub trait Clock {
     /// Milliseconds since the device started.
     fn uptime_ms(&mut self) -> u64;
 
-    /// Called during long steps, for a watchdog: before each block that is erased, at least once every
-    /// 256 bytes that are programmed and every 4096 that are read.
+    /// Called during long steps, for a watchdog: before each block that is erased, before each
+    /// line that is programmed, and at least once every 4096 bytes that are read.
     fn step(&mut self) {}
 }
 

@@ -142,7 +142,7 @@ use record::{Claims, Record};
 use slot::SlotFlash;
 
 /// Refuses, at compile time, flash that the storage cannot work with.
-#[inline(always)]
+#[inline]
 pub const fn require_supported<R: Flash>() {
     const {
         assert!(
@@ -156,7 +156,7 @@ pub const fn require_supported<R: Flash>() {
              bytes and no smaller than its program unit"
         );
         assert!(
-            Geometry::of::<R>().line() as usize % R::READ_SIZE == 0 && R::READ_SIZE <= 8,
+            R::READ_SIZE.is_power_of_two() && R::READ_SIZE <= 8,
             "this flash cannot hold blobs: what its driver reads at once (ReadNorFlash::READ_SIZE) must be 1, 2, 4 or 8 \
              bytes; wrap a driver that reads more"
         );

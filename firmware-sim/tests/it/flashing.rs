@@ -427,6 +427,44 @@ fn cameras_are_set_when_the_flash_is_made_and_not_later() {
     assert_eq!(device.client().status().unwrap().rig, Some(own));
 }
 
+/// The flash is that of the part that was asked for, and its file keeps that.
+#[test]
+fn a_flash_file_keeps_its_rules() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("device.flash");
+    let rules = "unit=32,block=131072,erased=00,ecc=error,blank=fault";
+    let device = Running::keeping("host", &file, &["--flash-rules", rules]);
+    let mut client = device.client();
+    assert_eq!(client.greeting().unit, 32);
+    client
+        .flash(&rig::blob(), &FlashOptions::default(), &mut |_| {})
+        .unwrap();
+    drop(device);
+    for arguments in [&[][..], &["--flash-rules", rules]] {
+        let device = Running::keeping("host", &file, arguments);
+        assert_eq!(active(&mut device.client()), Ok(rig::IDENTITY));
+    }
+    let fails = |command: &str, more: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_firmware-sim"))
+            .args([command, "--flash-file"])
+            .arg(&file)
+            .args(more)
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(2));
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    let message = fails("host", &["--flash-rules", "unit=16"]);
+    assert!(
+        message.contains(rules) && message.contains("unit=16"),
+        "{message}"
+    );
+    let message = fails("host", &["--flash-rules", "unit=24"]);
+    assert!(message.contains("1, 2, 4 ... 512"), "{message}");
+    let message = fails("qemu", &[]);
+    assert!(message.contains(rules), "{message}");
+}
+
 #[test]
 fn several_devices_at_once() {
     let devices: Vec<_> = (0..4_u8)

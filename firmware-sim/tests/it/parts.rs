@@ -4,8 +4,8 @@
 //! same blob, the old or the new one, and an update that succeeds; never a look in place at what cannot be read.
 //!
 //! `cargo test --release -p firmware-sim --test it parts -- --nocapture` prints how many cuts. With
-//! `SEEDS=10` in the environment every operation and every byte of a unit is cut, of three times as many kinds of
-//! part, otherwise some of them.
+//! `SEEDS=10` in the environment every operation is cut at every byte of a unit (longer than 16: at some 27), and
+//! three times as many kinds of part are tried.
 
 use crate::power_cuts::{
     MANNERS, NEW, NEXT, OLD, OLDER, active, ask, copy, seeds, status, survive, update_to, with_old,
@@ -35,8 +35,8 @@ fn blank(rules: &str) -> SimFlash {
     SimFlash::blank_with(rules, (front + 2 * slot) as usize, 0).unwrap()
 }
 
-/// Where in an operation of so many bytes to cut: everywhere in a unit if `all`, of a block all places that
-/// differ in what they hit.
+/// Where in an operation of so many bytes to cut: if `all`, at every byte of a unit of up to 16 and at some 27 of a
+/// longer one, among them the first nine and the last three; of a block at places that differ in what they hit.
 fn places(length: usize, unit: usize, all: bool) -> Vec<usize> {
     let mut places = if length > unit {
         vec![
@@ -51,8 +51,13 @@ fn places(length: usize, unit: usize, all: bool) -> Vec<usize> {
             length - 1,
             length,
         ]
-    } else if all {
+    } else if all && unit < 32 {
         (0..=length).collect()
+    } else if all {
+        (0..=8)
+            .chain((8..length).step_by(unit / 16))
+            .chain(length - 2..=length)
+            .collect()
     } else {
         vec![0, 1, length / 2, length - 1, length]
     };
@@ -62,9 +67,14 @@ fn places(length: usize, unit: usize, all: bool) -> Vec<usize> {
     places
 }
 
-/// Cuts `requests` short everywhere, or at some `share` of the operations in the middle.
-fn cut_everywhere(before: &SimFlash, requests: &[Request], either: [[u8; 16]; 2]) -> (u32, u32) {
-    let all = seeds() > 1;
+/// Cuts `requests` short, at every operation if `all`, otherwise at the first, at those of the commit and at some
+/// between; how often, and how often the second of `either` was in use then.
+fn cut_everywhere(
+    before: &SimFlash,
+    requests: &[Request],
+    either: [[u8; 16]; 2],
+    all: bool,
+) -> (u32, u32) {
     let mut dry = copy(before, 0);
     status(&mut dry);
     assert_eq!(dry.operations(), 0, "a start that has nothing to settle");
@@ -80,7 +90,7 @@ fn cut_everywhere(before: &SimFlash, requests: &[Request], either: [[u8; 16]; 2]
         let is_chosen = is_commit && (unit >= 8 || operation % 8 < 2)
             || operation < 2
             || length > unit
-            || operation % stride == 0;
+            || operation.is_multiple_of(stride);
         if !all && !is_chosen {
             continue;
         }
@@ -102,12 +112,12 @@ fn cut_everywhere(before: &SimFlash, requests: &[Request], either: [[u8; 16]; 2]
 }
 
 /// Cuts an update and a rollback everywhere, and starts that recover from that.
-fn try_part(rules: &str) -> u32 {
+fn try_part(rules: &str, all: bool) -> u32 {
     let before = with_old(blank(rules), true);
     let update = update_to(NEW);
-    let (updates, new) = cut_everywhere(&before, &update, [OLD, NEW]);
+    let (updates, new) = cut_everywhere(&before, &update, [OLD, NEW], all);
     assert!(new > 0 && new < updates, "{rules}: {new} of {updates}");
-    let (rollbacks, back) = cut_everywhere(&before, &[Request::Rollback], [OLD, OLDER]);
+    let (rollbacks, back) = cut_everywhere(&before, &[Request::Rollback], [OLD, OLDER], all);
     assert!(
         back > 0 && back < rollbacks,
         "{rules}: {back} of {rollbacks}"
@@ -159,7 +169,7 @@ fn try_unit(unit: u32) {
                 continue;
             }
             let rules = format!("unit={unit},block=4096,erased={erased}{more}");
-            runs += try_part(&rules);
+            runs += try_part(&rules, seeds() > 1 && is_always);
             parts += 1;
         }
     }
@@ -241,7 +251,7 @@ const REAL_PARTS: [(&str, &str); 18] = [
 fn real_parts() {
     let mut runs = 0;
     for (name, rules) in REAL_PARTS {
-        let cuts = try_part(rules);
+        let cuts = try_part(rules, seeds() > 1);
         println!("{name} ({rules}): {cuts} cuts, all survived");
         runs += cuts;
     }
@@ -292,7 +302,7 @@ fn a_cut_while_a_full_log_is_erased() {
     } else {
         [OLDER, OLD]
     };
-    let (runs, became_new) = cut_everywhere(&flash, &[Request::Rollback], either);
+    let (runs, became_new) = cut_everywhere(&flash, &[Request::Rollback], either, true);
     println!(
         "cuts while a full log is erased: {runs} runs, all survived; {became_new} rolled back"
     );
@@ -407,7 +417,7 @@ fn slots_of_the_first_layout_are_read() {
         assert_eq!(active(&mut flash), Some(OLDER));
         ask(&mut flash, &update_to(NEW)).unwrap();
         assert_eq!(active(&mut flash), Some(NEW));
-        let (runs, _) = cut_everywhere(&flash, &[Request::Rollback], [NEW, OLDER]);
+        let (runs, _) = cut_everywhere(&flash, &[Request::Rollback], [NEW, OLDER], false);
         assert!(runs > 0);
     }
 }
@@ -477,7 +487,7 @@ fn the_factory_blob_is_there_when_nothing_else_is() {
     let made: &[u8] = bytemuck::cast_slice(&aligned);
     for (name, rules) in REAL_PARTS {
         let mut flash = blank(rules);
-        let mut active = |flash: &mut SimFlash, requests: &[Request]| {
+        let active = |flash: &mut SimFlash, requests: &[Request]| {
             let replies = ask_with_factory(flash, made, requests);
             if let Some(Reply::Refused(refusal)) = replies.last() {
                 return Err(*refusal);
@@ -631,4 +641,44 @@ fn the_constants_of_a_driver_are_enough() {
     flashed::<32, 131_072>();
     flashed::<128, 8192>();
     flashed::<512, 512>();
+}
+
+/// A cut while the slot that could be rolled back to is being erased: a rollback is refused or lasts.
+#[test]
+fn a_rollback_after_a_cut_is_refused_or_lasts() {
+    let (mut refused, mut done) = (0, 0);
+    for (name, rules) in REAL_PARTS {
+        let before = with_old(blank(rules), true);
+        let update = update_to(NEW);
+        let block = before.rules().log_geometry().block as usize;
+        for (operation, byte) in [(0, 0), (0, 64), (0, block - 8), (0, block), (1, 0), (2, 4)] {
+            for cut in MANNERS {
+                for seed in 0..3 {
+                    let mut flash = copy(&before, seed);
+                    flash.plan_cut(Some(PowerCut {
+                        operation,
+                        byte,
+                        cut,
+                    }));
+                    let _ = ask(&mut flash, &update);
+                    assert_eq!(active(&mut flash), Some(OLD), "{name}");
+                    match ask(&mut flash, &[Request::Rollback]) {
+                        Ok(_) => done += 1,
+                        Err(_) => refused += 1,
+                    }
+                    let first = active(&mut flash);
+                    assert!(
+                        first == Some(OLD) || first == Some(OLDER),
+                        "{name}: {first:?}"
+                    );
+                    for start in 0..6 {
+                        assert_eq!(active(&mut flash), first, "{name}, start {start}");
+                    }
+                    assert_eq!(flash.unhandled_faults(), 0, "{name}");
+                }
+            }
+        }
+    }
+    println!("rollbacks after a cut in an erase: {done} last, {refused} are refused");
+    assert!(done > 0 && refused > 0);
 }

@@ -60,6 +60,13 @@ fn bytes_of_requests() {
         matches: vec(&[asked]),
     };
     #[rustfmt::skip]
+    assert_bytes(&Request::MeasurePoints(vec(&[asked])), &[
+        10, 1,
+        0xac, 0x02,
+        0, 0, 0, 0x80, 0x3f, 0, 0, 0, 0xc0,
+        1, 0, 0, 0, 0x3f, 0, 0, 0xc0, 0x3f,
+    ]);
+    #[rustfmt::skip]
     assert_bytes(&Request::MeasureNoisy(noisy), &[
         9, 0, 0, 0, 0x3f, 1,    // measure with 0.5 px, one match
         0xac, 0x02,
@@ -227,10 +234,11 @@ fn bytes_of_answers() {
         rollbacks: 6,
         rig: None,
         gaps: None,
+        arithmetic: Arithmetic::Float,
     };
     assert_bytes(
         &Reply::Status(without.clone()),
-        &[2, 1, 2, 3, 1, 5, 0, 0, 1, 0, 4, 5, 6, 0, 0],
+        &[2, 1, 2, 3, 1, 5, 0, 0, 1, 0, 4, 5, 6, 0, 0, 0],
     );
     let camera = CameraStatus {
         name: name("l"),
@@ -263,6 +271,7 @@ fn bytes_of_answers() {
             cameras: vec(&[camera]),
         }),
         gaps: Some(GAPS),
+        arithmetic: Arithmetic::Integer,
         ..without
     };
     #[rustfmt::skip]
@@ -279,6 +288,7 @@ fn bytes_of_answers() {
         1, 1, b's', 1, 1, b'l', 0x80, 0x01, 100,
         1, 3, 0, 0, 0x80, 0xbf, 0, 0, 0, 0x40, 0, 0, 0x80, 0x40,
         1, 2, 0, 0, 0, 0x3f, 0, 0, 0x80, 0xbf, 0, 0, 0x80, 0x3f,
+        1,                      // in integers
     ]);
 }
 
@@ -434,6 +444,7 @@ fn longest_status() -> Status {
             }),
             ..GAPS
         }),
+        arithmetic: Arithmetic::Integer,
     }
 }
 
@@ -447,7 +458,7 @@ fn a_long_name_is_cut_at_a_character() {
 /// The words for a code are tied to the runtime's numbering.
 #[test]
 fn a_refusal_for_want_of_a_blob_says_why() {
-    use ray_runtime::OpenError;
+    use ray_runtime::{OpenError, Rounding};
     for (error, words) in [
         (OpenError::BadMagic { found: 0 }, "holds no blob"),
         (
@@ -465,6 +476,12 @@ fn a_refusal_for_want_of_a_blob_says_why() {
             "damaged",
         ),
         (OpenError::BadHeader, "cannot be opened (code 7): flash one"),
+        (
+            OpenError::WrongRounding {
+                found: Rounding::TowardZero,
+            },
+            "round to nearest",
+        ),
     ] {
         let text = Refusal::NoBlob {
             open_error: error.code(),

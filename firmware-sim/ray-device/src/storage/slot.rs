@@ -24,7 +24,7 @@ pub trait SlotFlash {
     fn blob_to_write(&mut self) -> &mut Self::Blob;
 
     /// Where things lie in it.
-    #[inline(always)]
+    #[inline]
     fn shape(&self) -> Shape {
         let blob = self.blob().geometry();
         match self.log_apart() {
@@ -48,22 +48,22 @@ impl<R: MappedFlash> SlotFlash for R {
     type Log = R;
     type Blob = R;
 
-    #[inline(always)]
+    #[inline]
     fn log_apart(&self) -> Option<&R> {
         None
     }
 
-    #[inline(always)]
+    #[inline]
     fn log(&mut self) -> &mut R {
         self
     }
 
-    #[inline(always)]
+    #[inline]
     fn blob(&self) -> &R {
         self
     }
 
-    #[inline(always)]
+    #[inline]
     fn blob_to_write(&mut self) -> &mut R {
         self
     }
@@ -82,22 +82,22 @@ impl<L: Flash, B: MappedFlash> SlotFlash for SplitSlot<L, B> {
     type Log = L;
     type Blob = B;
 
-    #[inline(always)]
+    #[inline]
     fn log_apart(&self) -> Option<&L> {
         Some(&self.log)
     }
 
-    #[inline(always)]
+    #[inline]
     fn log(&mut self) -> &mut L {
         &mut self.log
     }
 
-    #[inline(always)]
+    #[inline]
     fn blob(&self) -> &B {
         &self.blob
     }
 
-    #[inline(always)]
+    #[inline]
     fn blob_to_write(&mut self) -> &mut B {
         &mut self.blob
     }

@@ -91,9 +91,16 @@ impl Flash for SimRegion<'_> {
             return Ok(chip.is_blank(self.start + start as usize, length as usize));
         }
         drop(chip);
-        let mut bytes = vec![0; length as usize];
-        self.read(start, &mut bytes)?;
-        Ok(bytes.iter().all(|&byte| byte == self.geometry.erased))
+        let erased = self.geometry.erased;
+        let mut bytes = [0; 64];
+        for at in (start..start + length).step_by(64) {
+            let piece = &mut bytes[..64.min(start + length - at) as usize];
+            self.read(at, piece)?;
+            if piece.iter().any(|&byte| byte != erased) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     fn start(&self) -> u32 {
