@@ -32,8 +32,8 @@ impl Images for InQemu {
         emulated(core).image_path(name)
     }
 
-    fn build_newest_only(&self, name: &str) -> Result<PathBuf, ImagesError> {
-        Ok(qemu::build_newest_only_image(name)?)
+    fn build_with(&self, name: &str, features: &str) -> Result<PathBuf, ImagesError> {
+        Ok(qemu::build_image_with(name, features)?)
     }
 
     fn run_counting(

@@ -47,21 +47,23 @@ impl Window {
     }
 
     /// The knots of i16 behind the first so many pairs of a table, from this window's first one on.
+    #[inline(always)]
     pub fn words<'a>(&self, pairs: &'a [[f32; 2]], knots_start: usize) -> Option<&'a [f32]> {
         // A knot takes half a pair.
         pairs.as_flattened().get(2 * knots_start + self.first..)
     }
 
-    /// The 16 of a cell of the same row of cells, whose number is `cell`, in a row of knots.
+    /// The knots of a cell of the same row of cells, whose number is `cell`, from those of its first one on,
+    /// blended.
     #[inline(always)]
-    pub fn cell_knots(&self, knots: &[f32], cell: usize) -> Option<CellKnots> {
-        let knots = knots.get(cell..)?;
-        let stride = usize::from(self.stride);
-        let mut rows = [[0; 4]; 4];
-        for (j, row) in rows.iter_mut().enumerate() {
-            *row = knots.get(j * stride..)?.first_chunk()?.map(word);
-        }
-        Some(CellKnots(rows))
+    pub fn blend_cell(
+        &self,
+        knots: &[f32],
+        cell: usize,
+        along: [Weights; 2],
+    ) -> Option<(i32, i32)> {
+        let stride = self.stride.into();
+        blend_rows(knots.get(cell..)?, stride, along, |row| row.map(word))
     }
 
     /// The same of i8, if that is what a number has bytes, or of i16.
@@ -110,18 +112,6 @@ fn blend_rows<K>(
         sums.1 += upper(along_u.applied_to(row.map(high)), weight);
     }
     Some(sums)
-}
-
-/// 4 x 4 knots: the two numbers of each in the two halves of a word.
-#[derive(Clone, Copy)]
-pub(crate) struct CellKnots([[i32; 4]; 4]);
-
-impl CellKnots {
-    /// Blended with weights along u in each of the four rows, without any rounding, and then along v.
-    #[inline(always)]
-    pub fn blended(&self, along: [Weights; 2]) -> Option<(i32, i32)> {
-        blend_rows(self.0.as_flattened(), 4, along, |row| *row)
-    }
 }
 
 /// The product with a weight, without its lowest 16 binary digits.

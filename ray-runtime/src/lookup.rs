@@ -220,11 +220,10 @@ impl MovingRay {
 /// The ray of a sample of a camera's table, rig frame.
 #[inline(always)]
 pub(crate) fn ray(record: Record<'_>, sample: Sample<f32>) -> Ray {
-    let pose = Pose::of(record);
     if record.is_central() {
-        central_ray(pose, sample.s)
+        central_ray(Pose::of(record), sample.s)
     } else {
-        shifted_ray(pose, sample)
+        shifted_ray(Pose::of(record), sample)
     }
 }
 

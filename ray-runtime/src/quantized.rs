@@ -8,7 +8,7 @@ use crate::format::{
     ALIGNMENT, PLACES_PER_CELL, QUANTIZED_HEADER_PAIRS, Record, coefficient_count, knots_len,
 };
 use crate::grid::Inside;
-use crate::knots::{CellKnots, Window};
+use crate::knots::Window;
 use crate::lookup::{self, Evaluated, Sample};
 use crate::polynomial::{self, AlongX, Dual};
 use crate::weights::Weights;
@@ -110,18 +110,14 @@ impl<'a> UsualRow<'a> {
         self.places_per_px
     }
 
-    /// The knots of a cell.
-    pub fn knots(&self, cell: usize) -> Option<CellKnots> {
-        self.window.cell_knots(self.knots, cell)
-    }
-
-    /// The half-angle vector at a pixel of a cell that has these knots, and the variable of the polynomials.
+    /// The half-angle vector at a pixel of a cell, and the variable of the polynomials.
     #[inline(always)]
-    pub fn direction(&self, knots: &CellKnots, from_edge_px: f32) -> Option<([f32; 2], f32)> {
+    pub fn direction(&self, cell: usize, from_edge_px: f32) -> Option<([f32; 2], f32)> {
         let place = (from_edge_px * self.places_per_px) as u32;
         let share = place % PLACES_PER_CELL;
         let along_u = Weights::at(share.cast_signed());
-        let left = knots.blended([along_u, self.along_v])?;
+        let along = [along_u, self.along_v];
+        let left = self.window.blend_cell(self.knots, cell, along)?;
         let x = from_edge_px * self.scale - 1.0;
         let [a, b] = self.direction.at(x);
         let s = [a + self.unit * left.0 as f32, b + self.unit * left.1 as f32];

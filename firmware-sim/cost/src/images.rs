@@ -26,11 +26,12 @@ pub trait Images {
     /// Where the image of this name is once it has been built.
     fn path(&self, core: &Core, name: &str) -> PathBuf;
 
-    /// Builds the device's image of this name without what reads blobs of old versions, and returns where it is.
+    /// Builds the image of this name with these features of the runtime alone, and returns where it is until
+    /// another one is built so.
     ///
     /// # Errors
     /// As [`Images::build`].
-    fn build_newest_only(&self, name: &str) -> Result<PathBuf, ImagesError>;
+    fn build_with(&self, name: &str, features: &str) -> Result<PathBuf, ImagesError>;
 
     /// Runs an image to its end on a flash that starts with this file; every instruction takes
     /// 2^`time_shift` ns of its time, and nothing else takes any.

@@ -43,6 +43,6 @@ pub use images::{Images, ImagesError};
 pub use measure::{measure, panics_in};
 #[cfg(feature = "std")]
 pub use report::{
-    BlobCost, CameraCost, Conditions, Cost, Function, ImageCost, Row, SCHEMA, Spread, StackBound,
-    Static,
+    BlobCost, CameraCost, Conditions, Cost, FormsCode, Function, ImageCost, Row, SCHEMA, Spread,
+    StackBound, Static,
 };

@@ -15,7 +15,7 @@ use crate::counting::KNOWN_INSTRUCTIONS;
 use crate::error::CostError;
 use crate::image::{Image, RESET, STARTUP};
 use crate::images::Images;
-use crate::report::{Conditions, Cost, ImageCost, SCHEMA};
+use crate::report::{Conditions, Cost, FormsCode, ImageCost, SCHEMA};
 
 /// The images whose size is reported, what each does, and the functions of each whose stack is.
 const IMAGES: [(&str, &str, &[&str]); 3] = [
@@ -36,6 +36,9 @@ const IMAGES: [(&str, &str, &[&str]); 3] = [
     ),
     ("device", "the device application", &[RESET]),
 ];
+
+/// Features with which the first image is built besides.
+const FORMS: [&str; 3] = ["patches", "quantized", "patches,quantized"];
 
 /// Counts the given blobs; the images are built first when they are missing or stale.
 ///
@@ -65,7 +68,17 @@ pub fn measure(images: &impl Images, paths: &[PathBuf]) -> Result<Cost, CostErro
             &mut conditions,
         )?);
     }
-    let newest_only = Image::read(&images.build_newest_only(IMAGES[0].0)?)?;
+    let forms = FORMS
+        .into_iter()
+        .map(|features| {
+            let image = Image::read(&images.build_with(IMAGES[0].0, features)?)?;
+            let code_bytes = runtime_code_bytes(&image.code_by_origin());
+            Ok(FormsCode {
+                features,
+                code_bytes,
+            })
+        })
+        .collect::<Result<_, CostError>>()?;
     let costs = IMAGES
         .iter()
         .map(|(name, does, functions)| image_cost(&images.path(core, name), name, does, functions))
@@ -75,7 +88,7 @@ pub fn measure(images: &impl Images, paths: &[PathBuf]) -> Result<Cost, CostErro
         conditions,
         blobs,
         images: costs,
-        newest_only_code_bytes: runtime_code_bytes(&newest_only.code_by_origin()),
+        forms,
     })
 }
 

@@ -18,8 +18,17 @@ pub struct Cost {
     pub blobs: Vec<BlobCost>,
     /// Per image: code, memory, bound of the stack.
     pub images: Vec<ImageCost>,
-    /// Code of the runtime in the first of them without the feature `old-versions`.
-    pub newest_only_code_bytes: u64,
+    /// Code of the runtime in the first of them with some of the forms of tables.
+    pub forms: Vec<FormsCode>,
+}
+
+/// What the runtime takes with some of the forms of tables.
+#[derive(Debug, Serialize)]
+pub struct FormsCode {
+    /// The features of `ray-runtime`, separated by commas.
+    pub features: &'static str,
+    /// Code, bytes.
+    pub code_bytes: u64,
 }
 
 /// What it was measured with.

@@ -128,9 +128,12 @@ impl Cost {
         let _ = writeln!(text, "{}", sizes(&self.images).drawn(style));
         let _ = writeln!(
             text,
-            "Without the feature `old-versions` of `ray-runtime`, which reads blobs of versions 1 and 2, the code of the \
-             first is {} bytes.\n",
-            self.newest_only_code_bytes
+            "Code of the runtime in the first with other features than all three: {}.\n",
+            self.forms
+                .iter()
+                .map(|form| format!("`{}` {} bytes", form.features, form.code_bytes))
+                .collect::<Vec<_>>()
+                .join(", ")
         );
         heading(text, style, "Code by the crate it comes from, bytes");
         let _ = writeln!(text, "{}", origins(&self.images).drawn(style));

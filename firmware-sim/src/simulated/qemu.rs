@@ -182,16 +182,23 @@ pub fn build_image(image: &str) -> Result<PathBuf, QemuError> {
     Ok(DEVICE.image_path(image))
 }
 
-/// Builds the image of this name without what reads blobs of old versions, and returns where it is.
+/// Builds the image of this name with these features alone, separated by commas, and returns where it is until
+/// another one is built so.
 ///
 /// # Errors
 /// As [`build_image`].
-pub fn build_newest_only_image(image: &str) -> Result<PathBuf, QemuError> {
-    let folder = root().join("target/embedded/newest-only");
+pub fn build_image_with(image: &str, features: &str) -> Result<PathBuf, QemuError> {
+    let folder = root().join("target/embedded/only");
     let folder_argument = folder.display().to_string();
     DEVICE.build_with(
         &[image],
-        &["--no-default-features", "--target-dir", &folder_argument],
+        &[
+            "--no-default-features",
+            "--features",
+            features,
+            "--target-dir",
+            &folder_argument,
+        ],
         &[],
     )?;
     Ok(folder.join(DEVICE.target).join("release").join(image))

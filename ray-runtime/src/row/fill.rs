@@ -19,8 +19,7 @@ trait Form {
     fn cut(&self) -> Cut;
 
     /// Writes the rays of pixels of a cell, the first of which is so far from the region's first edge.
-    /// `None` cannot happen in a blob that was opened.
-    fn write(&self, cell: u32, first_px: f32, step_px: f32, rays: &mut [Ray]) -> Option<()>;
+    fn write(&self, cell: u32, first_px: f32, step_px: f32, rays: &mut [Ray]);
 }
 
 impl<'a> Views<'a> {
@@ -71,8 +70,10 @@ fn fill(form: &impl Form, places: &Places, mask: MaskRow<'_>, rays: &mut [Ray]) 
                 calibrated.from(places, at, cell_end)
             };
             let run = rays.get_mut(at..to).unwrap_or_default();
-            if !is_set || form.write(cell, places.at(at), step_px, run).is_none() {
-                mark(rays.get_mut(at..to).unwrap_or_default());
+            if is_set {
+                form.write(cell, places.at(at), step_px, run);
+            } else {
+                mark(run);
             }
             at = to;
         }
@@ -118,10 +119,14 @@ impl<const MAPS: usize> Form for Patches<'_, MAPS> {
     }
 
     #[inline(never)]
-    fn write(&self, cell: u32, first_px: f32, step_px: f32, mut rays: &mut [Ray]) -> Option<()> {
+    fn write(&self, cell: u32, first_px: f32, step_px: f32, mut rays: &mut [Ray]) {
         let axis = self.record.axis_u();
         let cell_edge_px = axis.cell_edge_px(cell);
-        let maps: &[_; MAPS] = self.maps.get(cell as usize * MAPS..)?.first_chunk()?;
+        let rest = self.maps.get(cell as usize * MAPS..).unwrap_or_default();
+        let Some(maps) = rest.first_chunk::<MAPS>() else {
+            // Never, in a blob that was opened.
+            return mark(rays);
+        };
         let maps: [AlongX; MAPS] = core::array::from_fn(|k| AlongX::new(&maps[k], self.y));
         let pose = Pose::of(self.record);
         let mut from_edge_px = first_px;
@@ -139,7 +144,6 @@ impl<const MAPS: usize> Form for Patches<'_, MAPS> {
                 shifted_ray(pose, Sample { s, n })
             };
         }
-        Some(())
     }
 }
 
@@ -156,25 +160,26 @@ impl Form for UsualRow<'_> {
     }
 
     #[inline(never)]
-    fn write(&self, cell: u32, first_px: f32, step_px: f32, rays: &mut [Ray]) -> Option<()> {
-        let knots = self.knots(cell as usize)?;
-        // Not seen through: the compiler would take all words apart in advance, and has no registers
-        // for what comes out.
-        let knots = black_box(&knots);
+    fn write(&self, cell: u32, first_px: f32, step_px: f32, mut rays: &mut [Ray]) {
         let pose = Pose::of(self.record());
         let is_central = self.record().is_central();
         let mut from_edge_px = first_px;
-        for ray in rays {
+        while let Some((ray, rest)) = rays.split_first_mut() {
+            rays = rest;
+            // Keeps the compiler from taking all knots of the cell apart in advance: it has no registers for
+            // what comes out.
             black_box(());
-            let (s, x) = self.direction(knots, from_edge_px)?;
+            let found = self.direction(cell as usize, from_edge_px);
             from_edge_px += step_px;
-            *ray = if is_central {
-                central_ray(pose, s)
-            } else {
-                let n = self.offset(x);
-                shifted_ray(pose, Sample { s, n })
+            *ray = match found {
+                Some((s, _)) if is_central => central_ray(pose, s),
+                Some((s, x)) => {
+                    let n = self.offset(x);
+                    shifted_ray(pose, Sample { s, n })
+                }
+                // Never, in a blob that was opened.
+                None => Ray::OUTSIDE,
             };
         }
-        Some(())
     }
 }

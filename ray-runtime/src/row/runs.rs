@@ -67,6 +67,10 @@ impl Places {
     /// The pixels that lie in the region: the first, and the one behind the last.
     #[inline(never)]
     pub fn in_region(&self) -> [usize; 2] {
+        let last = self.counted.wrapping_sub(1);
+        if self.at(0) >= 0.0 && self.at(last) <= self.extent_px {
+            return [0, self.counted];
+        }
         let begin = self.end_of(0, self.counted, 0.0, |x| x < 0.0);
         let is_within = |x: f32| x <= self.extent_px;
         [
