@@ -16,7 +16,7 @@ use firmware_sim::simulated::host::SimulatedDevice;
 use firmware_sim::simulated::qemu::{self, QemuDevice};
 use firmware_sim::simulated::sim_flash::{BadRules, Rules};
 use firmware_sim::slot_image::Part;
-use ray_device::protocol::{CameraStatus, MAX_CAMERAS_LISTED, MAX_NAME, Rig, name};
+use ray_device::protocol::{Arithmetic, CameraStatus, MAX_CAMERAS_LISTED, MAX_NAME, Rig, name};
 use ray_device::storage::trust::{PublicKey, Trust};
 
 /// A measuring device, simulated.
@@ -42,6 +42,9 @@ enum Command {
         /// needed; stall-ms=N: how long an erase takes. A flash file keeps its rules.
         #[arg(long, value_name = "RULES", value_parser = flash_rules)]
         flash_rules: Option<Rules>,
+        /// What it computes points in; integer is for cores without a floating-point unit.
+        #[arg(long, value_enum, default_value = "f32")]
+        arithmetic: ArithmeticArg,
     },
     /// The same application as a Cortex-M4F image in QEMU; the image is built first when it is
     /// missing or stale.
@@ -68,6 +71,15 @@ enum Command {
         #[arg(long, conflicts_with = "json")]
         markdown: bool,
     },
+}
+
+/// What a device computes in.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum ArithmeticArg {
+    /// Numbers of 32 bits with a floating point
+    F32,
+    /// Integers: no standard deviations
+    Integer,
 }
 
 #[derive(clap::Args)]
@@ -183,7 +195,8 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         Command::Host {
             device,
             flash_rules,
-        } => run_on_host(device, *flash_rules),
+            arithmetic,
+        } => run_on_host(device, *flash_rules, *arithmetic),
         Command::Qemu { device, image } => run_in_qemu(device, image.as_deref()),
         Command::Cost {
             target,
@@ -225,10 +238,18 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-fn run_on_host(arguments: &DeviceArguments, rules: Option<Rules>) -> Result<(), Failure> {
+fn run_on_host(
+    arguments: &DeviceArguments,
+    rules: Option<Rules>,
+    arithmetic: ArithmeticArg,
+) -> Result<(), Failure> {
     let FlashFile { flash, kept_in } = arguments.flash(rules)?;
     let trust = arguments.public_key.map_or(Trust::Anybody, Trust::Signed);
-    let device = SimulatedDevice::start_trusting(arguments.listen, flash, trust)
+    let arithmetic = match arithmetic {
+        ArithmeticArg::F32 => Arithmetic::Float,
+        ArithmeticArg::Integer => Arithmetic::Integer,
+    };
+    let device = SimulatedDevice::start_device(arguments.listen, flash, trust, arithmetic)
         .map_err(|error| format!("the device on {}: {error}", arguments.listen))?;
     announce(device.address())?;
     device.serve_forever();

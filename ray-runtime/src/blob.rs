@@ -2,10 +2,14 @@
 
 use crate::camera::Camera;
 use crate::camera_check::CameraCheck;
+#[cfg(feature = "integer")]
+use crate::check::check_arithmetic;
 use crate::check::{
     check_padding, check_pairs, check_sections, check_self_tests, checked_header,
     is_region_on_sensor, recognized_header,
 };
+#[cfg(feature = "integer")]
+use crate::format::Arithmetic;
 use crate::format::{
     self, ALIGNMENT, CameraMeta, HEADER_LEN, IDENTITY_LEN, Messages, PairHeader, RECORD_LEN,
     RECORD_WORDS, Record,
@@ -36,6 +40,8 @@ pub struct RayBlob<'a> {
     match_noise: Option<MatchNoise>,
     max_error_px: f32,
     working_distance_mm: f32,
+    #[cfg(feature = "integer")]
+    arithmetic: Option<Arithmetic<'a>>,
 }
 
 impl<'a> RayBlob<'a> {
@@ -101,6 +107,8 @@ impl<'a> RayBlob<'a> {
             match_noise: None,
             max_error_px: meta.max_error_px,
             working_distance_mm: meta.working_distance_mm,
+            #[cfg(feature = "integer")]
+            arithmetic: None,
         };
         let is_positive = |x: f32| x > 0.0 && x.is_finite();
         if !(is_positive(meta.max_error_px) && is_positive(meta.working_distance_mm)) {
@@ -122,6 +130,11 @@ impl<'a> RayBlob<'a> {
             header.camera_count,
             |cameras| blob.pair(cameras.map(usize::from)).is_some(),
         )?;
+        #[cfg(feature = "integer")]
+        let blob = Self {
+            arithmetic: check_arithmetic(bytes, pairs_end, blob.self_tests())?,
+            ..blob
+        };
         Ok(blob)
     }
 
@@ -176,6 +189,12 @@ impl<'a> RayBlob<'a> {
     /// central, mm.
     pub const fn working_distance_mm(&self) -> f32 {
         self.working_distance_mm
+    }
+
+    /// What the packer has proven of the arithmetic of integers ([`integer`](crate::integer)), if the blob says so.
+    #[cfg(feature = "integer")]
+    pub const fn arithmetic(&self) -> Option<Arithmetic<'a>> {
+        self.arithmetic
     }
 
     /// How noisy the pixels of matches are, if the blob says so; else they are taken to be as exact as the
@@ -316,16 +335,17 @@ impl<'a> RayBlob<'a> {
     /// The point nearest to the rays of any number of cameras, by least squares. Two give the
     /// bits of [`RayBlob::triangulate`].
     ///
-    /// Nothing is stored, so each ray is looked up about five times if there are more than two.
+    /// Nothing is stored, so each ray is looked up about five times if there are more than two. A sighting is a
+    /// camera and a pixel, or whatever becomes such a pair.
     ///
     /// # Errors
     /// Any [`MeasureError`].
-    pub fn triangulate_many(
+    pub fn triangulate_many<S: Copy + Into<(usize, PixelPoint)>>(
         &self,
-        sightings: &[(usize, PixelPoint)],
+        sightings: &[S],
     ) -> Result<Triangulation, MeasureError> {
         triangulate::triangulate_many(sightings.len(), |k| match sightings.get(k) {
-            Some(&sighting) => self.sighting(sighting),
+            Some(&sighting) => self.sighting(sighting.into()),
             None => Err(MeasureError::TooFewRays { have: k }),
         })
     }

@@ -1,6 +1,8 @@
 //! Single checks that opening a blob is made of.
 
 use crate::OpenError;
+#[cfg(feature = "integer")]
+use crate::format::Arithmetic;
 use crate::format::{
     self, ALIGNMENT, Axis, CameraMeta, HEADER_LEN, Header, MAGIC, MAX_CAMERAS, MAX_EXTENT_PX,
     MAX_SECTIONS, Messages, OLDEST_VERSION, SECTIONS_SINCE, Section, SelfTest, VERSION, tag,
@@ -133,11 +135,38 @@ pub(crate) fn check_sections(bytes: &[u8], start: usize, version: u16) -> Result
         check_padding(bytes, end, at)?;
         match section.header.tag {
             tag::MATCH_NOISE => known.match_noise = Some(section.match_noise().ok_or(bad)?),
+            // Checked by itself, and only by those who use it.
+            tag::ARITHMETIC if cfg!(feature = "integer") => {}
             tag if section.header.is_required => return Err(OpenError::UnknownSection { tag }),
             _ => {}
         }
     }
     Ok(known)
+}
+
+/// What the sections from `start` on, which were checked, say of the arithmetic of integers: as many numbers as the self-tests
+/// of rays and matches ask for.
+#[cfg(feature = "integer")]
+pub(crate) fn check_arithmetic<'a>(
+    bytes: &'a [u8],
+    start: usize,
+    self_tests: impl Iterator<Item = SelfTest>,
+) -> Result<Option<Arithmetic<'a>>, OpenError> {
+    let mut at = start;
+    for index in 0..MAX_SECTIONS {
+        let Some((section, behind)) = bytes.get(at..).and_then(Section::read) else {
+            break;
+        };
+        if section.header.tag == tag::ARITHMETIC {
+            let numbers: usize = self_tests.map(|test| test.answer_len()).sum();
+            return Arithmetic::read(section.content)
+                .filter(|arithmetic| arithmetic.answers.len() == numbers)
+                .map(Some)
+                .ok_or(OpenError::BadSection { section: index });
+        }
+        at = format::aligned(bytes.len().saturating_sub(behind.len()));
+    }
+    Ok(None)
 }
 
 /// Checks that there are as many self-tests as stated, of cameras that exist and of pairs whose

@@ -8,6 +8,7 @@ use crate::rounding::Rounding;
 
 /// Which part of the blob an [`OpenError`] speaks of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Table {
     /// The working numbers of a camera.
     Record,
@@ -19,6 +20,7 @@ pub enum Table {
 
 /// Why bytes are not a blob that this version reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum OpenError {
     /// There are fewer bytes than the header states (or than a header has).
@@ -149,6 +151,7 @@ impl OpenError {
 
 /// Why a pixel has no ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum LookupError {
     /// The pixel lies outside the calibrated area, or is not a number.
@@ -174,6 +177,7 @@ impl LookupError {
 
 /// Why a match has no point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum MeasureError {
     /// A pixel lies outside its camera's calibrated area, or is not a number.
@@ -222,6 +226,7 @@ impl MeasureError {
 
 /// Why a point has no pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ProjectError {
     /// No pixel of the camera's calibrated area was found to see the point.
@@ -256,6 +261,7 @@ impl From<LookupError> for ProjectError {
 
 /// Why what a sensor delivers cannot be mapped to the pixels of the calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ReadoutError {
     /// The camera was calibrated on a sensor of another size. Nothing is ever scaled.

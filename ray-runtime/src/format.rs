@@ -5,6 +5,8 @@
 //! header | metadata (postcard) | pad to 8 | records | tables | pairs | sections
 //! ```
 
+#[cfg(feature = "integer")]
+mod arithmetic;
 mod axis;
 mod encoding;
 mod header;
@@ -15,6 +17,8 @@ mod quantized;
 mod record;
 mod section;
 
+#[cfg(feature = "integer")]
+pub use arithmetic::{ARITHMETIC_HEADER_LEN, Arithmetic, INTEGER};
 pub use axis::Axis;
 pub use encoding::{Encoding, Form, PATCH_LEN, coefficient_count};
 pub use header::{

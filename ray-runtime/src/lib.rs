@@ -18,6 +18,8 @@ mod epipolar_row;
 mod error;
 pub mod format;
 mod grid;
+#[cfg(feature = "integer")]
+pub mod integer;
 mod knots;
 mod lookup;
 mod mask;

@@ -77,7 +77,7 @@ const NON_CENTRAL_SPLINE: u32 = number(Form::Spline, false);
 /// Forms that are read: nothing is linked of those that are not.
 pub(crate) const HAS_PATCHES: bool = cfg!(feature = "patches");
 pub(crate) const HAS_QUANTIZED: bool = cfg!(feature = "quantized");
-const HAS_SPLINES: bool = cfg!(feature = "old-versions");
+pub(crate) const HAS_SPLINES: bool = cfg!(feature = "old-versions");
 
 const fn number(form: Form, is_central: bool) -> u32 {
     Encoding { form, is_central }.number()

@@ -24,12 +24,23 @@ impl Iterator for SelfTests<'_> {
 
 /// The first self-test that did not give the bits it should.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SelfTestFailure {
     /// Number of the test, from 0.
     pub test: usize,
 }
 
 impl SelfTest {
+    /// How many numbers another arithmetic answers with ([`Arithmetic`](crate::format::Arithmetic)).
+    #[cfg(feature = "integer")]
+    pub const fn answer_len(&self) -> usize {
+        match self {
+            Self::Ray { .. } => 6,
+            Self::Pair { .. } => 4,
+            Self::Sigma { .. } => 0,
+        }
+    }
+
     /// Whether the blob gives the answer, bit for bit.
     pub fn passes(&self, blob: &RayBlob<'_>) -> bool {
         match *self {

@@ -31,6 +31,20 @@ impl Weights {
         Self::packed(a, 3 * to_first - 2 * a + d, 3 * to_last - 2 * d + a, d)
     }
 
+    /// The same numbers one by one, in multiplications of 16 by 16 binary digits.
+    #[cfg(feature = "integer")]
+    #[inline(always)]
+    pub fn of_halves(share: i32) -> [i32; 4] {
+        let (to_first, to_last) = (share - CELL, -share);
+        let cube = |share: i32| {
+            let square = share * share;
+            // Of the 45 digits behind the point, 29 are left out in two steps.
+            ((square >> 16) * share + (((square & 0xffff) * share) >> 16)) >> 13
+        };
+        let (a, d) = (cube(to_first), cube(to_last));
+        [a, 3 * to_first - 2 * a + d, 3 * to_last - 2 * d + a, d]
+    }
+
     /// Half of their derivatives by the share of a cell, 0 to 1.
     pub fn half_slopes(share: i32) -> Self {
         let to_first = CELL - share;
@@ -94,6 +108,8 @@ mod tests {
             let [a, b, c, d] = Weights::at(share).each();
             assert!([a, b, c, d].iter().all(|w| *w <= 0), "{share}");
             assert_eq!(a + b + c + d, -SUM, "{share}");
+            #[cfg(feature = "integer")]
+            assert_eq!(Weights::of_halves(share), [a, b, c, d]);
             // Knots at -1, 0, 1 and 2 cells.
             assert_eq!(-a + c + 2 * d, -3 * share, "{share}");
             let t = f64::from(share) / f64::from(CELL);

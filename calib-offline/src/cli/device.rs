@@ -21,7 +21,8 @@ const FORMATS: &str = "\
 status    what it measures with, what its two slots hold, and whether the calibration still fits: the
           gaps between the rays of what it has measured, with sign and unit, beside those that the
           blob predicts. Gaps do not see an error of scale or of the cameras' distance.
-selftest  the blob's self-tests, computed on the device; they must give the packing host's bits
+selftest  the blob's self-tests, computed on the device; they must give the packing host's bits. A device that
+          computes in integers compares those that the blob states for integers (pack --arithmetic integer)
 rollback  the blob in the other slot, after a check of all of it, becomes the one in use
 
 Exit code 1: the gaps say that the cameras have moved, or a self-test gave other bits.
@@ -34,6 +35,7 @@ With --json, status, schema calib-offline/device-status/1:
                  open_error)
   update (identity, bytes, received_bytes)
   rig (serial, cameras (name, width_px, height_px))
+  arithmetic     what it computes points in: f32 or integer
   gaps (verdict, points, mean_signed_mm, mean_size_mm, within_95_mm, predicted (points,
     mean_sigma_mm, shift, spread))
                  verdict: fits, shifted, scattered, too_few_points or nothing_predicted

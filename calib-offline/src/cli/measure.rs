@@ -1,4 +1,4 @@
-//! `measure`: matches to points, with a blob (the device's own code in f32), a calibration (f64), or on a
+//! `measure`: matches to points, with a blob (the device's own code in f32 or integers), a calibration (f64), or on a
 //! device.
 
 use super::Outcome;
@@ -6,6 +6,7 @@ use super::error::Error;
 use super::lengths::{self, check_lengths};
 use super::match_noise::{in_f32, parse};
 use super::output::Console;
+use super::pack::ArithmeticArg;
 use super::place::check_file;
 use super::rig_file::{RigFile, open};
 use super::usage_error::UsageError;
@@ -33,6 +34,7 @@ Example:
   calib-offline measure results/calibration.json matches.csv -o points.csv --frame left
   calib-offline measure results/rig.rays matches.csv -o points.csv --match-noise-px 0.2
   calib-offline measure results/calibration.json matches.csv -o points.csv --lengths bar.csv
+  calib-offline measure results/rig.rays matches.csv -o points.csv --arithmetic integer
   calib-offline measure --device tcp:127.0.0.1:7777 matches.csv -o points.csv";
 
 const FORMATS: &str = "\
@@ -49,6 +51,10 @@ A matcher is seldom as exact as the corners of the calibration. The noise of the
 corners. --estimate-match-noise finds it from the gaps of these very matches and says how well: a median,
 so that wrong matches hardly count. Gaps see only the noise across the plane of the two rays; that
 within it, which makes most of the error in depth, is taken to be as large.
+
+With --arithmetic integer a blob is evaluated as a device without a floating-point unit does it: the same bits there
+and here, near those of f32, and no sigma. Of a match of more than two cameras the first two with rays count. A device
+must compute in integers itself.
 
 A blob is evaluated with the device's own library and gives the device's bits; a calibration is
 evaluated in double precision. With --device the device measures, with the blob it has in use: the
@@ -111,6 +117,9 @@ pub struct MeasureArgs {
     /// Check known lengths between the points, of a file as below
     #[arg(long, value_name = "LENGTHS.csv", conflicts_with = "device")]
     pub lengths: Option<PathBuf>,
+    /// What rays and points are computed in; integer takes a blob, or a device that computes in integers
+    #[arg(long, value_name = "WHAT", value_enum, default_value_t = ArithmeticArg::F32)]
+    pub arithmetic: ArithmeticArg,
     /// Replace whatever stands in the output's place
     #[arg(long)]
     pub force: bool,
@@ -120,6 +129,10 @@ impl MeasureArgs {
     /// The file that measures; none where a device does.
     fn rig(&self) -> Option<&Path> {
         self.second.as_ref().map(|_| self.first.as_path())
+    }
+
+    fn in_integers(&self) -> bool {
+        self.arithmetic == ArithmeticArg::Integer
     }
 
     /// The matches.
@@ -155,6 +168,11 @@ struct NoiseUsed {
 /// # Errors
 /// [`Error`], with nothing written.
 pub fn run(args: &MeasureArgs, console: &Console) -> Result<Outcome, Error> {
+    if args.in_integers()
+        && (args.lengths.is_some() || args.estimate_match_noise || args.match_noise_px.is_some())
+    {
+        return Err(Error::Usage(UsageError::NoSigmaInIntegers));
+    }
     let mut inputs = vec![args.matches()];
     inputs.extend(args.rig());
     inputs.extend(args.lengths.as_deref());
@@ -204,6 +222,9 @@ fn measure_there(args: &MeasureArgs, address: &str) -> Result<Measured, Error> {
     let client = connect(address, DEFAULT_TIMEOUT)?;
     let noise = args.match_noise_px.and_then(in_f32);
     let mut source = DeviceSource::new(client, address)?.with_noise(noise);
+    if args.in_integers() {
+        source = source.in_integers(address)?;
+    }
     let mut input = open_matches(args.matches())?;
     let summary = stream(args, &mut input, |file, input, output| {
         measure_batches(&mut source, file, input, output)
@@ -227,6 +248,14 @@ fn measure_here(args: &MeasureArgs, rig: &Path) -> Result<(&'static str, Measure
                 names(BlobSource::new(&blob, None)),
                 BlobSource::new(&blob, frame),
             )?;
+            let source = if args.in_integers() {
+                source.in_integers().map_err(|cause| UsageError::Unsuited {
+                    path: rig.to_owned(),
+                    cause,
+                })?
+            } else {
+                source
+            };
             let (mut input, noise) = prepare(args, |input| {
                 noise_with_blob(&source, args.matches(), input)
             })?;
@@ -239,6 +268,12 @@ fn measure_here(args: &MeasureArgs, rig: &Path) -> Result<(&'static str, Measure
                 measure_with_blob(&source, file, input, output)
             })?;
             ("blob", (summary, noise.or_of_rig(own_px)))
+        }
+        RigFile::Calibration(_) if args.in_integers() => {
+            return Err(Error::Usage(UsageError::UnknownKind {
+                path: rig.to_owned(),
+                expected: "a blob (*.rays), which integers take: make one with calib-offline pack",
+            }));
         }
         RigFile::Calibration(mut calibration) => {
             let (mut input, noise) = {

@@ -35,6 +35,7 @@ With --json, schema calib-offline/pack/2:
   max_error_px      asked for; null with only --max-bytes
   worst_error_px, worst_error_mm
                     found; mm at the working distance
+  integer_error_px  found for the arithmetic of integers; null without --arithmetic integer
   cameras (name, form, central, cells, bytes, worst_error_px, worst_error_mm)
   pairs (cameras, nodes, bytes, sigma_error/calibration_sigma_error (rms, worst))
                     relative
@@ -68,9 +69,21 @@ pub struct PackArgs {
     /// Leave out the uncertainty: a smaller blob, and no sigma from it
     #[arg(long)]
     pub no_uncertainty: bool,
+    /// Prove the error of this arithmetic too, and write its answers to the self-tests: for devices without a floating-point unit
+    #[arg(long, value_name = "WHAT", value_enum, default_value_t = ArithmeticArg::F32)]
+    pub arithmetic: ArithmeticArg,
     /// Replace whatever stands in the output's place
     #[arg(long)]
     pub force: bool,
+}
+
+/// What rays and points are computed in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ArithmeticArg {
+    /// Numbers of 32 bits with a floating point
+    F32,
+    /// Integers
+    Integer,
 }
 
 /// What matters among tables within the limits.
@@ -91,6 +104,7 @@ struct PackObject<'a> {
     max_error_px: Option<f64>,
     worst_error_px: f64,
     worst_error_mm: f64,
+    integer_error_px: Option<f64>,
     cameras: Vec<PackedCamera>,
     pairs: Vec<PairObject>,
     match_noise_px: Option<f64>,
@@ -135,6 +149,7 @@ pub fn run(args: &PackArgs, console: &Console) -> Result<Outcome, Error> {
             PreferArg::Size => Prefer::Size,
             PreferArg::Speed => Prefer::Speed,
         },
+        with_integers: args.arithmetic == ArithmeticArg::Integer,
         ..pack_settings(&calibration, max_error_px)
     };
     let rig = &mut calibration.rig;
@@ -162,6 +177,7 @@ pub fn run(args: &PackArgs, console: &Console) -> Result<Outcome, Error> {
             .or(args.max_bytes.is_none().then_some(default_px)),
         worst_error_px: packed.worst_error_px,
         worst_error_mm: packed.worst_error_mm,
+        integer_error_px: packed.integer_error_px,
         cameras: packed
             .tables
             .into_iter()
@@ -195,8 +211,11 @@ pub fn run(args: &PackArgs, console: &Console) -> Result<Outcome, Error> {
         (_, Some(bytes)) => format!("{max_error_px} px in at most {bytes} bytes"),
         (_, None) => format!("{max_error_px} px"),
     };
+    let integers = object.integer_error_px.map_or(String::new(), |px| {
+        format!("; in integers every ray within {} px", short(px))
+    });
     let words = format!(
-        "{} bytes, every ray within {} px, {} mm at the working distance (asked for: {asked}){uncertainty}; written to {}",
+        "{} bytes, every ray within {} px, {} mm at the working distance (asked for: {asked}){integers}{uncertainty}; written to {}",
         object.bytes,
         short(object.worst_error_px),
         short(object.worst_error_mm),

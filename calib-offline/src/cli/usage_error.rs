@@ -70,6 +70,20 @@ pub enum UsageError {
     /// A pose to leave out that the recording does not have.
     #[error(transparent)]
     NoSuchPose(#[from] NoSuchPose),
+    /// What takes standard deviations, in an arithmetic without any.
+    #[error(
+        "--arithmetic integer gives no standard deviations, which --lengths, --match-noise-px and --estimate-match-noise take"
+    )]
+    NoSigmaInIntegers,
+    /// A blob that integers cannot look up.
+    #[error("{}: integers cannot look this blob up", path.display())]
+    Unsuited {
+        /// The blob.
+        path: PathBuf,
+        /// Why.
+        #[source]
+        cause: ray_runtime::integer::Unsuited,
+    },
     /// A device's verb without its address.
     #[error("which device is meant? --device is missing")]
     NoDevice,
@@ -175,6 +189,7 @@ impl Remedy for UsageError {
             Self::NoSuchPose(error) => return error.remedy(),
             Self::LengthsOfStream => "write the matches to a file first",
             Self::Task(error) => return error.remedy(),
+            Self::NoSigmaInIntegers | Self::Unsuited { .. } => "leave --arithmetic integer out",
             Self::NoDevice => "give its address, such as --device tcp:127.0.0.1:7777",
             Self::NotPacked { .. } => {
                 "pack it first: calib-offline pack calibration.json -o rig.rays"

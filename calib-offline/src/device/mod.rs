@@ -43,6 +43,12 @@ pub enum DeviceError {
     /// Its blob has one camera.
     #[error("the device's blob has one camera, a point takes two")]
     OneCamera,
+    /// It computes in another arithmetic than the one asked for.
+    #[error("the device at {address} does not compute in integers")]
+    NotInIntegers {
+        /// As given.
+        address: String,
+    },
     /// It is older than requests that say how noisy matches are.
     #[error("the device's firmware does not take the noise of matches with a request")]
     NoMatchNoise,
@@ -62,6 +68,9 @@ impl Remedy for DeviceError {
                 "flash one with calib-offline flash RIG.rays --device ADDRESS; calib-offline device status says what is wrong"
             }
             Self::TooManyCameras { .. } => "measure here, with the blob",
+            Self::NotInIntegers { .. } => {
+                "measure without --arithmetic integer, or have the device's builder choose them (firmware-sim host --arithmetic integer)"
+            }
             Self::OneCamera => "calibrate two cameras together; a single one gives rays only",
             Self::NoMatchNoise => "bring its firmware up to date, or measure here, with the blob",
             Self::UnknownOutcome { .. } => "bring this program up to date",

@@ -3,7 +3,7 @@
 use super::DeviceError;
 use calib_rays::measure::{Answers, BatchSource, Point, Sighting, Status};
 use firmware_sim::client::{ClientError, DeviceClient};
-use ray_device::protocol::{self, Match, Refusal};
+use ray_device::protocol::{self, Arithmetic, Match, Refusal};
 use ray_runtime::{LookupError, MatchNoise, MeasureError};
 
 /// A device that triangulates: the bits of the blob in its flash, measured there.
@@ -39,6 +39,19 @@ impl DeviceSource {
             client,
             cameras: cameras.map(|camera| camera.name.to_string()).collect(),
             noise: None,
+        })
+    }
+
+    /// The same, of a device that computes in integers and no other.
+    ///
+    /// # Errors
+    /// [`DeviceError::NotInIntegers`].
+    pub fn in_integers(mut self, address: &str) -> Result<Self, DeviceError> {
+        if self.client.status()?.arithmetic == Arithmetic::Integer {
+            return Ok(self);
+        }
+        Err(DeviceError::NotInIntegers {
+            address: address.to_owned(),
         })
     }
 

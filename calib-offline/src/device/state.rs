@@ -2,7 +2,7 @@
 
 use calib_recording::dataset::identity::hex;
 use ray_device::health::{GapReport, Verdict};
-use ray_device::protocol::{self, CameraStatus, Hello, Status};
+use ray_device::protocol::{self, Arithmetic, CameraStatus, Hello, Status};
 use serde::Serialize;
 
 /// The answer to `status`.
@@ -36,6 +36,8 @@ pub struct DeviceState {
     pub rig: Option<RigState>,
     /// Gaps of what it has measured; `None` before the first point.
     pub gaps: Option<GapState>,
+    /// What it computes points in: f32 or integer.
+    pub arithmetic: &'static str,
 }
 
 /// The blob in use.
@@ -152,6 +154,10 @@ impl DeviceState {
                 serial: rig.serial.to_string(),
                 cameras: cameras(&rig.cameras),
             }),
+            arithmetic: match status.arithmetic {
+                Arithmetic::Float => "f32",
+                Arithmetic::Integer => "integer",
+            },
             gaps: status.gaps.map(|report| GapState {
                 verdict: verdict_word(report.verdict()),
                 report,

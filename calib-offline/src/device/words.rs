@@ -35,6 +35,9 @@ pub fn state_in_words(state: &DeviceState) -> String {
             }
         ),
     });
+    if state.arithmetic == "integer" {
+        lines.push("computes in integers: points without standard deviations".to_owned());
+    }
     for (number, slot) in state.slots.iter().enumerate() {
         lines.push(format!("slot {number}: {}", slot_in_words(slot)));
     }

@@ -1,6 +1,8 @@
 //! One number for the bits of many answers, so that machines can be compared: the host, a Cortex-M4F,
 //! and a processor without a floating-point unit.
 
+#[cfg(feature = "integer")]
+use ray_runtime::integer::Rig;
 use ray_runtime::{Camera, Measurement, PixelPoint, RayBlob};
 use split_mix::SplitMix;
 
@@ -27,6 +29,32 @@ pub fn digest(blob: &RayBlob<'_>, count: u32) -> Option<Digest> {
                 digest.add_point(&measured);
                 if digest.points.is_multiple_of(PROJECTED_EVERY) {
                     digest.add_projection(blob, &measured);
+                }
+            }
+            Err(error) => digest.add(u32::from(error.code())),
+        }
+    }
+    Some(digest)
+}
+
+#[cfg(feature = "integer")]
+/// The same of the arithmetic of integers: points and gaps of the same matches. `None` too of a blob that it cannot look up.
+pub fn digest_of_integers(blob: &RayBlob<'_>, count: u32) -> Option<Digest> {
+    let cameras = [blob.camera(0)?, blob.camera(1)?];
+    let integers = Rig::<2>::prepare(blob).ok()?;
+    let mut random = SplitMix(0x0b17_5eed);
+    let mut digest = Digest {
+        checksum: FNV_OFFSET,
+        points: 0,
+    };
+    for _ in 0..count {
+        let [a, b] = [0, 1].map(|k| pixel(&mut random, &cameras[k]));
+        match integers.triangulate((0, a), (1, b)) {
+            Ok(found) => {
+                digest.points += 1;
+                let [x, y, z] = found.point_mm;
+                for number in [x, y, z, found.gap_squared_mm2] {
+                    digest.add(number.to_bits());
                 }
             }
             Err(error) => digest.add(u32::from(error.code())),

@@ -12,6 +12,8 @@
 //! }
 //! ```
 
+#[cfg(feature = "integer")]
+mod integers;
 mod self_test;
 
 use heapless::Vec;
@@ -20,8 +22,8 @@ use ray_runtime::{MatchNoise, MeasureError, OpenError, PixelPoint, RayBlob};
 use crate::health::Health;
 use crate::port::{Clock, Regions};
 use crate::protocol::{
-    BlobStatus, CameraStatus, Chunk, Hello, MAX_CHUNK, MAX_MATCHES, Match, Measured, NewBlob,
-    Point, Refusal, Reply, Request, Rig, Sighting, SlotState, Status, StoredBlob, name,
+    Arithmetic, BlobStatus, CameraStatus, Chunk, Hello, MAX_CHUNK, MAX_MATCHES, Match, Measured,
+    NewBlob, Point, Refusal, Reply, Request, Rig, SlotState, Status, StoredBlob, name,
 };
 use crate::session::Responder;
 use crate::storage::factory::Factory;
@@ -41,6 +43,7 @@ pub struct Device<C> {
     kind: &'static str,
     clock: C,
     trust: Trust,
+    arithmetic: Arithmetic,
     transfer: Option<Transfer>,
     /// Of what this epoch's blob measured.
     health: Health,
@@ -57,6 +60,7 @@ impl<C: Clock> Device<C> {
             kind,
             clock,
             trust: Trust::Anybody,
+            arithmetic: Arithmetic::Float,
             transfer: None,
             health: Health::new(),
             answered: 0,
@@ -70,6 +74,15 @@ impl<C: Clock> Device<C> {
     #[must_use]
     pub fn taking(mut self, trust: Trust) -> Self {
         self.trust = trust;
+        self
+    }
+
+    /// The same device, computing in integers: for a core without a floating-point unit. A blob that they cannot look up is refused
+    /// when it is asked to measure, with the code of the runtime's `Unsuited`.
+    #[cfg(feature = "integer")]
+    #[must_use]
+    pub fn computing_in_integers(mut self) -> Self {
+        self.arithmetic = Arithmetic::Integer;
         self
     }
 
@@ -115,8 +128,12 @@ impl<C: Clock> Device<C> {
             Some(_) => blob.map_err(OpenError::code),
             None => Err(booted.open_error),
         };
+        #[cfg(feature = "integer")]
+        let integers = integers::prepared(self.arithmetic, &blob);
         Epoch {
             device: self,
+            #[cfg(feature = "integer")]
+            integers,
             blob,
             rig,
             active: stored,
@@ -141,6 +158,9 @@ impl<C: Clock> Device<C> {
 pub struct Epoch<'e, S, C> {
     device: &'e mut Device<C>,
     blob: Result<RayBlob<'e>, u8>,
+    /// The blob prepared for integers where they are asked for, or why it cannot be.
+    #[cfg(feature = "integer")]
+    integers: Option<Result<integers::Rig<'e>, u8>>,
     rig: Option<Rig>,
     active: Option<StoredBlob>,
     slots: [SlotState; 2],
@@ -153,13 +173,23 @@ pub struct Epoch<'e, S, C> {
     is_over: bool,
 }
 
-impl<S: SlotFlash, C: Clock> Epoch<'_, S, C> {
+impl<'e, S: SlotFlash, C: Clock> Epoch<'e, S, C> {
+    /// The blob in use, open, or why there is none: the stable code of the runtime's `OpenError`, or
+    /// [`OTHER_PART`](storage::OTHER_PART). It is a copy that borrows the slot and not the epoch, so that one task can
+    /// measure while another serves: see `examples`. Both end with the epoch.
+    ///
+    /// # Errors
+    /// That code.
+    pub const fn blob(&self) -> Result<RayBlob<'e>, u8> {
+        self.blob
+    }
+
     /// The answer to a request of this peer.
     pub fn respond_to(&mut self, peer: Peer, request: &Request) -> Reply {
         let reply = match request {
             Request::Hello => Ok(Reply::Hello(self.hello())),
             Request::Status => Ok(Reply::Status(self.status())),
-            Request::Measure(matches) => self.measure(matches, None),
+            Request::Measure(matches) => self.measure(matches, Asked::Sigmas(None)),
             Request::BeginUpdate(new) => self.begin_update(peer, new),
             Request::Chunk(chunk) => self.store(peer, chunk),
             Request::FinishUpdate => self.finish_update(peer),
@@ -167,9 +197,10 @@ impl<S: SlotFlash, C: Clock> Epoch<'_, S, C> {
             Request::Rollback => self.rollback(peer),
             Request::SelfTest => self.self_test(),
             Request::MeasureNoisy(asked) => match MatchNoise::from_px(asked.noise_px) {
-                Some(noise) => self.measure(&asked.matches, Some(noise)),
+                Some(noise) => self.measure(&asked.matches, Asked::Sigmas(Some(noise))),
                 None => Err(Refusal::BadNoise),
             },
+            Request::MeasurePoints(matches) => self.measure(matches, Asked::Points),
         };
         match reply {
             Ok(reply) => {
@@ -215,21 +246,34 @@ impl<S: SlotFlash, C: Clock> Epoch<'_, S, C> {
             rollbacks: self.device.rollbacks,
             rig: self.rig.clone(),
             gaps: self.device.health.report(),
+            arithmetic: self.device.arithmetic,
         }
     }
 
     #[inline(never)]
-    fn measure(&mut self, matches: &[Match], noise: Option<MatchNoise>) -> Result<Reply, Refusal> {
+    fn measure(&mut self, matches: &[Match], asked: Asked) -> Result<Reply, Refusal> {
         let blob = opened(&self.blob)?;
+        #[cfg(feature = "integer")]
+        if let Some(integers) = integers::of(&self.integers)? {
+            let measured = matches
+                .iter()
+                .map(|asked| integers::measure(integers, asked));
+            return Ok(Reply::Measured(bounded(measured)));
+        }
         let health = &mut self.device.health;
         let measured = matches
             .iter()
-            .map(|asked| measure_one(blob, asked, noise, health));
+            .map(|of| measure_one(blob, of, asked, health));
         Ok(Reply::Measured(bounded(measured)))
     }
 
     fn self_test(&self) -> Result<Reply, Refusal> {
-        Ok(Reply::SelfTested(self_test::report(opened(&self.blob)?)))
+        let blob = opened(&self.blob)?;
+        #[cfg(feature = "integer")]
+        if let Some(integers) = integers::of(&self.integers)? {
+            return Ok(Reply::SelfTested(integers::report(integers, blob)));
+        }
+        Ok(Reply::SelfTested(self_test::report(blob)))
     }
 
     #[inline(never)]
@@ -409,29 +453,42 @@ fn blob_status(blob: &RayBlob<'_>) -> BlobStatus {
     }
 }
 
-/// `noise` is the blob's business where it is none.
-fn measure_one(
-    blob: &RayBlob<'_>,
-    asked: &Match,
-    noise: Option<MatchNoise>,
-    health: &mut Health,
-) -> Measured {
-    let pixel_of = |sighting: Sighting| {
+/// What is asked of matches.
+#[derive(Clone, Copy)]
+enum Asked {
+    /// Points alone.
+    Points,
+    /// Their standard deviations too, of pixels that are so noisy; that is the blob's business where it is not said.
+    Sigmas(Option<MatchNoise>),
+}
+
+/// The two pixels of a match.
+fn sightings(asked: &Match) -> [(usize, PixelPoint); 2] {
+    [asked.first, asked.second].map(|sighting| {
         (
             usize::from(sighting.camera),
             PixelPoint::new(sighting.u_px, sighting.v_px),
         )
+    })
+}
+
+fn measure_one(blob: &RayBlob<'_>, of: &Match, asked: Asked, health: &mut Health) -> Measured {
+    let [first, second] = sightings(of);
+    let outcome = match asked {
+        Asked::Points => blob.triangulate(first, second).map(Point::from),
+        Asked::Sigmas(noise) => {
+            let outcome = match noise {
+                Some(noise) => blob.triangulate_with_noise(first, second, noise),
+                None => blob.triangulate_with_covariance(first, second),
+            };
+            if let Ok(measured) = &outcome {
+                health.note(measured);
+            }
+            outcome.map(Point::from)
+        }
     };
-    let (first, second) = (pixel_of(asked.first), pixel_of(asked.second));
-    let outcome = match noise {
-        Some(noise) => blob.triangulate_with_noise(first, second, noise),
-        None => blob.triangulate_with_covariance(first, second),
-    };
-    if let Ok(measured) = &outcome {
-        health.note(measured);
-    }
     Measured {
-        id: asked.id,
-        outcome: outcome.map(Point::from).map_err(MeasureError::code),
+        id: of.id,
+        outcome: outcome.map_err(MeasureError::code),
     }
 }

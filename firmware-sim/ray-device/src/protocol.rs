@@ -11,7 +11,7 @@
 mod refusal;
 
 use heapless::{String, Vec};
-use ray_runtime::Measurement;
+use ray_runtime::{Measurement, Triangulation};
 use serde::{Deserialize, Serialize};
 
 use crate::health::GapReport;
@@ -42,6 +42,7 @@ pub type Name = String<MAX_NAME>;
 
 /// What a workstation asks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 // There is no heap to box the large variant into, and one request exists at a time.
 #[allow(clippy::large_enum_variant)]
 pub enum Request {
@@ -74,10 +75,14 @@ pub enum Request {
     /// Triangulate these, whose pixels are as noisy as said here. Answered by [`Reply::Measured`], or refused with
     /// [`Refusal::BadNoise`]. A device that does not know it answers [`Refusal::UnknownMessage`].
     MeasureNoisy(NoisyMatches),
+    /// Triangulate these without their standard deviations, which take four times as long as the points. Answered by
+    /// [`Reply::Measured`]; such points do not count into [`Status::gaps`].
+    MeasurePoints(Vec<Match, MAX_MATCHES>),
 }
 
 /// What a device answers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[allow(clippy::large_enum_variant)]
 pub enum Reply {
     /// The request could not be carried out. Which blob is active did not change.
@@ -103,6 +108,7 @@ pub enum Reply {
 
 /// A blob to be sent.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NewBlob {
     /// Its length, bytes.
     pub length: u32,
@@ -119,6 +125,7 @@ pub struct NewBlob {
 
 /// An Ed25519 signature (RFC 8032) of all bytes of a blob.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Signature {
     /// Its first half, a point.
     pub r: [u8; 32],
@@ -139,6 +146,7 @@ impl Signature {
 
 /// A piece of a blob on its way.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Chunk {
     /// Where in the blob it starts.
     pub offset: u32,
@@ -148,6 +156,7 @@ pub struct Chunk {
 
 /// A blob in a slot, with a valid commit record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StoredBlob {
     /// Which slot, 0 or 1; 2: none, the device's factory blob is in use.
     pub slot: u8,
@@ -163,6 +172,7 @@ pub struct StoredBlob {
 
 /// What the self-tests of the active blob gave on this device.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SelfTestReport {
     /// How many the blob holds.
     pub tests: u16,
@@ -179,6 +189,7 @@ pub struct SelfTestReport {
 
 /// Matches with the noise of their pixels, in place of what the blob says of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NoisyMatches {
     /// Standard deviation of each pixel coordinate, px, in the range of the runtime's `MatchNoise`.
     pub noise_px: f32,
@@ -188,6 +199,7 @@ pub struct NoisyMatches {
 
 /// A point seen by two cameras.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Match {
     /// The sender's own number, given back with the answer.
     pub id: u32,
@@ -199,6 +211,7 @@ pub struct Match {
 
 /// One camera's pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sighting {
     /// Index of the camera in the blob.
     pub camera: u8,
@@ -210,6 +223,7 @@ pub struct Sighting {
 
 /// The answer to one [`Match`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Measured {
     /// The [`Match::id`] it answers.
     pub id: u32,
@@ -219,6 +233,7 @@ pub struct Measured {
 
 /// A triangulated point.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Point {
     /// x, y, z in the rig's frame, mm.
     pub point_mm: [f32; 3],
@@ -226,7 +241,8 @@ pub struct Point {
     pub gap_squared_mm2: f32,
     /// Predicted standard deviation along x, y and z of the rig's frame, mm: what the calibration
     /// leaves uncertain, and the pixels' noise, which is that of the request, else that of the blob's matches, else
-    /// that of the calibration's corners. `None` where the blob does not say.
+    /// that of the calibration's corners. `None` where the blob does not say, of [`Request::MeasurePoints`] and from a
+    /// device that computes in integers.
     pub sigma_mm: Option<[f32; 3]>,
 }
 
@@ -236,6 +252,16 @@ impl From<Measurement> for Point {
             point_mm: measured.found.point_mm,
             gap_squared_mm2: measured.found.gap_squared_mm2,
             sigma_mm: measured.covariance.map(|covariance| covariance.sigma_mm()),
+        }
+    }
+}
+
+impl From<Triangulation> for Point {
+    fn from(found: Triangulation) -> Self {
+        Self {
+            point_mm: found.point_mm,
+            gap_squared_mm2: found.gap_squared_mm2,
+            sigma_mm: None,
         }
     }
 }
@@ -256,6 +282,7 @@ impl Point {
 
 /// Who the device is and what it takes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Hello {
     /// What kind of device this is.
     pub device: Name,
@@ -275,6 +302,7 @@ pub struct Hello {
 
 /// How the device is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Status {
     /// Since it started, ms.
     pub uptime_ms: u64,
@@ -301,10 +329,23 @@ pub struct Status {
     pub rig: Option<Rig>,
     /// The gaps of what it has measured with this blob; `None` before the first point.
     pub gaps: Option<GapReport>,
+    /// What it computes points in.
+    pub arithmetic: Arithmetic,
+}
+
+/// What a device computes rays and points in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Arithmetic {
+    /// Numbers of f32.
+    #[default]
+    Float,
+    /// Integers. Its points have no standard deviations, and do not count into [`Status::gaps`].
+    Integer,
 }
 
 /// What a slot holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SlotState {
     /// Nothing that was ever finished.
     Empty,
@@ -323,6 +364,7 @@ pub enum SlotState {
 
 /// How far an update has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct UpdateStatus {
     /// Length of the new blob, bytes.
     pub length: u32,
@@ -334,6 +376,7 @@ pub struct UpdateStatus {
 
 /// What a device knows of the cameras it is built with, from its factory record.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rig {
     /// Serial number of the rig; empty if it has none.
     pub serial: Name,
@@ -343,6 +386,7 @@ pub struct Rig {
 
 /// The blob in use.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BlobStatus {
     /// Hash of the calibration it was packed from.
     pub identity: [u8; IDENTITY_LENGTH],
@@ -356,6 +400,7 @@ pub struct BlobStatus {
 
 /// A camera, of the blob in use or of the device itself.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CameraStatus {
     /// Its name.
     pub name: Name,

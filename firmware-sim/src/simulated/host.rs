@@ -15,7 +15,7 @@ use crate::simulated::flash_file;
 use crate::simulated::sim_flash::SimFlash;
 use ray_device::app::Device;
 use ray_device::port::{Clock, Link};
-use ray_device::protocol::{Refusal, Reply, Request};
+use ray_device::protocol::{Arithmetic, Refusal, Reply, Request};
 use ray_device::session::{Paused, Responder, Session};
 use ray_device::storage::transfer::Peer;
 use ray_device::storage::trust::Trust;
@@ -55,6 +55,14 @@ impl SimulatedDevice {
         Self::start_trusting(listen, flash, Trust::Anybody)
     }
 
+    /// The same, computing in integers.
+    ///
+    /// # Errors
+    /// If the address cannot be listened on.
+    pub fn start_in_integers(listen: SocketAddr, flash: SimFlash) -> std::io::Result<Self> {
+        Self::start_device(listen, flash, Trust::Anybody, Arithmetic::Integer)
+    }
+
     /// The same, taking only blobs that this trust allows.
     ///
     /// # Errors
@@ -64,12 +72,25 @@ impl SimulatedDevice {
         flash: SimFlash,
         trust: Trust,
     ) -> std::io::Result<Self> {
+        Self::start_device(listen, flash, trust, Arithmetic::Float)
+    }
+
+    /// Whose blobs it takes and what it computes in, both of which its owner settles.
+    ///
+    /// # Errors
+    /// If the address cannot be listened on.
+    pub fn start_device(
+        listen: SocketAddr,
+        flash: SimFlash,
+        trust: Trust,
+        arithmetic: Arithmetic,
+    ) -> std::io::Result<Self> {
         let listener = TcpListener::bind(listen)?;
         let address = listener.local_addr()?;
         let (asks, asked) = mpsc::channel();
         thread::Builder::new()
             .name("device".into())
-            .spawn(move || run(flash, trust, &asked))?;
+            .spawn(move || run(flash, trust, arithmetic, &asked))?;
         let server = thread::Builder::new()
             .name("listener".into())
             .spawn(move || accept(&listener, &asks))?;
@@ -99,9 +120,12 @@ enum Ask {
 }
 
 /// The device, until nobody can ask it any more.
-fn run(mut flash: SimFlash, trust: Trust, asked: &Receiver<Ask>) {
+fn run(mut flash: SimFlash, trust: Trust, arithmetic: Arithmetic, asked: &Receiver<Ask>) {
     let clock = HostClock(Instant::now());
     let mut device = Device::new("firmware-sim host", clock).taking(trust);
+    if arithmetic == Arithmetic::Integer {
+        device = device.computing_in_integers();
+    }
     let mut regions = flash.regions();
     loop {
         let mut epoch = device.epoch(&mut regions);

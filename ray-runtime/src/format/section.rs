@@ -25,7 +25,7 @@ pub mod tag {
     pub const SINGLE_RAYS: u16 = 3;
     /// Reserved: more tables, for other temperatures or focus settings.
     pub const CONDITIONS: u16 = 4;
-    /// Reserved: the proven error of an arithmetic other than f32, and its self-tests.
+    /// The proven error of the arithmetic of integers, and its answers to the self-tests. Known with the feature `integer`.
     pub const ARITHMETIC: u16 = 5;
     /// From here on anybody may give a section a meaning of their own; the format never will.
     pub const FIRST_PRIVATE: u16 = 0x8000;

@@ -1,7 +1,9 @@
 //! Points from a blob, with the device's own f32 code.
 
+use crate::pack::IntegerRig;
 use calib_rays::measure::{Gap, Point, PointSource, Sighting, Status, answering_of};
 use nalgebra::{Matrix3, Vector3};
+use ray_runtime::integer::Unsuited;
 use ray_runtime::{MatchNoise, Measurement, PixelPoint, RayBlob};
 
 /// A blob, evaluated by the device's own library.
@@ -9,6 +11,8 @@ use ray_runtime::{MatchNoise, Measurement, PixelPoint, RayBlob};
 pub struct BlobSource<'a> {
     blob: &'a RayBlob<'a>,
     noise: Option<MatchNoise>,
+    /// The blob prepared for the arithmetic of integers, where that is to be used.
+    integers: Option<Box<IntegerRig<'a>>>,
     /// Whether it carries the uncertainty of any two cameras.
     is_uncertain: bool,
     /// Turned about the origin after subtracting the camera's place.
@@ -26,6 +30,7 @@ impl<'a> BlobSource<'a> {
         Some(Self {
             blob,
             noise: None,
+            integers: None,
             is_uncertain: blob.uncertain_pairs().next().is_some(),
             rig_from_frame,
         })
@@ -38,12 +43,29 @@ impl<'a> BlobSource<'a> {
         self
     }
 
+    /// The same in the arithmetic of integers: points of the first two pixels of a match that have rays, without standard
+    /// deviations.
+    ///
+    /// # Errors
+    /// [`Unsuited`] if it has no place for the blob's numbers.
+    pub fn in_integers(mut self) -> Result<Self, Unsuited> {
+        self.integers = Some(Box::new(IntegerRig::prepare(self.blob)?));
+        Ok(self)
+    }
+
     fn pair(
         &self,
         a: Sighting<f32>,
         b: Sighting<f32>,
     ) -> Result<Measurement, ray_runtime::MeasureError> {
         let (a, b) = (pixel(a), pixel(b));
+        if let Some(integers) = &self.integers {
+            return Ok(Measurement {
+                found: integers.triangulate(a, b)?,
+                is_second_above: false,
+                covariance: None,
+            });
+        }
         if !self.is_uncertain {
             // The same bits, without the derivatives.
             return Ok(Measurement {
@@ -80,7 +102,12 @@ impl PointSource for BlobSource<'_> {
                 let (camera_idx, pixel) = pixel(*sighting);
                 self.blob.lookup(camera_idx, pixel).is_ok()
             });
-            &answering[..]
+            let most = if self.integers.is_some() {
+                2
+            } else {
+                usize::MAX
+            };
+            &answering[..answering.len().min(most)]
         } else {
             sightings
         };

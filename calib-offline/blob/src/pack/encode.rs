@@ -26,6 +26,8 @@ pub struct BlobParts {
     pub pairs: Vec<Vec<u8>>,
     /// How noisy matches are, if it is known.
     pub match_noise: Option<MatchNoise>,
+    /// What is proven of the arithmetic of integers, if it was asked for.
+    pub arithmetic: Option<Vec<u8>>,
 }
 
 impl BlobParts {
@@ -72,6 +74,10 @@ impl BlobParts {
         }
         if let Some(noise) = self.match_noise {
             push_section(&mut tables, tag::MATCH_NOISE, &noise.px().to_le_bytes())?;
+        }
+
+        if let Some(content) = &self.arithmetic {
+            push_section(&mut tables, tag::ARITHMETIC, content)?;
         }
 
         let mut header = Header {

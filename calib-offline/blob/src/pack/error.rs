@@ -121,6 +121,17 @@ pub enum PackError {
     /// The runtime does not repeat its own answers.
     #[error("self-test {} of the blob fails on this machine", .0.test)]
     SelfTest(SelfTestFailure),
+    /// The arithmetic of integers has no place for the rig's numbers.
+    #[error("integers cannot look this rig up: {0}")]
+    Integers(ray_runtime::integer::Unsuited),
+    /// The arithmetic of integers has no ray where there should be one, or no point.
+    #[error(
+        "integers have no ray at some calibrated pixel of camera `{camera}`, or another where there should be none"
+    )]
+    IntegerRays {
+        /// The camera.
+        camera: String,
+    },
     /// The blob would be larger than its length field can say.
     #[error("the blob would have {bytes} bytes; the format ends at 4 GiB")]
     TooLarge {
@@ -145,6 +156,10 @@ impl Remedy for PackError {
             Self::TooFewBytes { need, .. } => format!(
                 "allow {need} bytes, a larger --max-error-px, or leave the uncertainty out with --no-uncertainty"
             ),
+            Self::Integers(_) | Self::IntegerRays { .. } => {
+                "pack without --arithmetic integer: devices with a floating-point unit need none of it"
+                    .to_owned()
+            }
             Self::NothingCalibrated { .. } => {
                 "calibrate with corners over more of the sensor".to_owned()
             }

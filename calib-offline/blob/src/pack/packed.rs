@@ -18,6 +18,8 @@ pub struct Packed {
     pub worst_error_mm: f64,
     /// One for each camera, in the rig's order.
     pub tables: Vec<PackedTable>,
+    /// Largest error of the arithmetic of integers over the same pixels, px, if it was asked for.
+    pub integer_error_px: Option<f64>,
     /// One for each pair of cameras whose uncertainty the blob carries.
     pub pairs: Vec<PackedPair>,
     /// What other sizes would cost. From small to large; each holds a smaller error than the one

@@ -2,6 +2,7 @@
 
 use super::aligned_bytes::AlignedBytes;
 use super::error::PackError;
+use super::integers::Integers;
 use super::packed::{Packed, PackedTable};
 use super::proof::Proof;
 use super::settings::PackSettings;
@@ -21,6 +22,7 @@ pub struct Packer<'a> {
     rig: &'a Rig,
     settings: PackSettings,
     cameras: Vec<Trials<'a>>,
+    progress: &'a dyn Progress,
 }
 
 /// A camera's table and the comparison of every pixel with it.
@@ -47,6 +49,7 @@ impl<'a> Packer<'a> {
             rig,
             settings: *settings,
             cameras,
+            progress,
         })
     }
 
@@ -162,6 +165,7 @@ impl<'a> Packer<'a> {
             self_tests: Vec::new(),
             pairs: Vec::new(),
             match_noise: match_noise(self.rig)?,
+            arithmetic: None,
         })
     }
 
@@ -184,6 +188,15 @@ impl<'a> Packer<'a> {
         parts.max_error_px = encode::rounded_up(worst_error_px);
         let unasked = AlignedBytes::from(parts.encode(rig, tables())?.as_slice());
         parts.self_tests = self_test::ask(rig, &RayBlob::open(&unasked)?, distance_mm);
+        let integer_error_px = if self.settings.with_integers {
+            let unproven = AlignedBytes::from(parts.encode(rig, tables())?.as_slice());
+            let proven =
+                Integers::prove(rig, &RayBlob::open(&unproven)?, distance_mm, self.progress)?;
+            parts.arithmetic = Some(proven.content);
+            Some(proven.error_px)
+        } else {
+            None
+        };
         let bytes = parts.encode(rig, tables())?;
         RayBlob::open(&AlignedBytes::from(bytes.as_slice()))?
             .run_self_tests()
@@ -213,6 +226,7 @@ impl<'a> Packer<'a> {
         Ok(Packed {
             bytes,
             worst_error_px,
+            integer_error_px,
             worst_error_mm: worst_mm.fold(0.0, f64::max),
             tables,
             pairs,

@@ -7,7 +7,8 @@ use calib_rays::geometry::PixelPoint;
 use calib_rays::numerics::median;
 use calib_rays::progress::Progress;
 use nalgebra::{Matrix2, Vector2, Vector3};
-use ray_runtime::RayBlob;
+use ray_runtime::format::MAX_CAMERAS;
+use ray_runtime::{RayBlob, integer};
 use rayon::prelude::*;
 
 /// The comparison of a camera in a blob with its f64 field.
@@ -30,10 +31,31 @@ pub struct Proof {
     pub pixel_count: usize,
 }
 
+/// The rays of a camera in a blob, by its index there: as one of the runtime's arithmetics looks them up.
+#[derive(Clone, Copy)]
+pub enum Rays<'a> {
+    /// That of f32.
+    Float(&'a RayBlob<'a>, usize),
+    /// That of integers.
+    Integer(&'a IntegerRig<'a>, usize),
+}
+
+/// As many cameras as a blob may hold.
+pub type IntegerRig<'a> = integer::Rig<'a, { MAX_CAMERAS as usize }>;
+
+impl Rays<'_> {
+    fn lookup(self, pixel: ray_runtime::PixelPoint) -> Option<ray_runtime::Ray> {
+        match self {
+            Self::Float(blob, camera) => blob.lookup(camera, pixel).ok(),
+            Self::Integer(rig, camera) => rig.lookup(camera, pixel).ok(),
+        }
+    }
+}
+
 /// Compares every `stride`-th pixel along both axes (1: all).
 pub fn prove(
     camera: &CalibratedCamera,
-    (blob, camera_idx): (&RayBlob<'_>, usize),
+    rays: Rays<'_>,
     working_distance_mm: f64,
     stride: usize,
     progress: &dyn Progress,
@@ -45,7 +67,7 @@ pub fn prove(
         &camera.field,
         columns.iter().map(|u| f64::from(*u)).collect(),
     );
-    let judge = Judge::new(camera, blob, camera_idx, working_distance_mm);
+    let judge = Judge::new(camera, rays, working_distance_mm);
     rows.par_iter()
         .map(|&v| {
             let row = field.row(f64::from(v));
@@ -66,13 +88,8 @@ pub fn prove(
 
 /// Compares quarter pixels on both sides of every border between calibrated and other cells of the
 /// mask, and along the edge of the sensor: half a pixel to each side, where tables end.
-pub fn prove_edges(
-    camera: &CalibratedCamera,
-    blob: &RayBlob<'_>,
-    camera_idx: usize,
-    working_distance_mm: f64,
-) -> Proof {
-    let judge = Judge::new(camera, blob, camera_idx, working_distance_mm);
+pub fn prove_edges(camera: &CalibratedCamera, rays: Rays<'_>, working_distance_mm: f64) -> Proof {
+    let judge = Judge::new(camera, rays, working_distance_mm);
     let mask = &camera.coverage;
     let (width_px, height_px) = mask.cell_size_px();
     let is_covered = |i: Option<usize>, j: Option<usize>| {
@@ -172,23 +189,16 @@ impl Proof {
 /// Compares rays of a blob with the field's.
 struct Judge<'a> {
     camera: &'a CalibratedCamera,
-    blob: &'a RayBlob<'a>,
-    camera_idx: usize,
+    rays: Rays<'a>,
     working_distance_mm: f64,
     max_px_per_mm: f64,
 }
 
 impl<'a> Judge<'a> {
-    fn new(
-        camera: &'a CalibratedCamera,
-        blob: &'a RayBlob<'a>,
-        camera_idx: usize,
-        working_distance_mm: f64,
-    ) -> Self {
+    fn new(camera: &'a CalibratedCamera, rays: Rays<'a>, working_distance_mm: f64) -> Self {
         Self {
             camera,
-            blob,
-            camera_idx,
+            rays,
             working_distance_mm,
             max_px_per_mm: 10.0 * usual_px_per_mm(camera, working_distance_mm),
         }
@@ -197,7 +207,7 @@ impl<'a> Judge<'a> {
     /// The comparison of one pixel; `None` where neither the blob nor the calibration has a ray.
     fn compare(&self, pixel: PixelPoint, exact: impl FnOnce() -> FieldSample) -> Option<Proof> {
         let device_pixel = ray_runtime::PixelPoint::new(pixel.u as f32, pixel.v as f32);
-        let ray = self.blob.lookup(self.camera_idx, device_pixel).ok();
+        let ray = self.rays.lookup(device_pixel);
         let [error_px, error_mm] = match (self.camera.coverage.contains(pixel), ray) {
             (true, Some(ray)) => self.errors(&exact(), &ray),
             (false, None) => return None,

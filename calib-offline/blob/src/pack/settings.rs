@@ -16,6 +16,8 @@ pub struct PackSettings {
     pub with_uncertainty: bool,
     /// What matters among tables that hold the bound.
     pub prefer: Prefer,
+    /// Whether the error of the arithmetic of integers is proven too, and written with its answers to the self-tests.
+    pub with_integers: bool,
 }
 
 /// What matters among tables that hold the bound.
@@ -37,6 +39,7 @@ impl Default for PackSettings {
             identity: [0; IDENTITY_LEN],
             with_uncertainty: true,
             prefer: Prefer::Size,
+            with_integers: false,
         }
     }
 }

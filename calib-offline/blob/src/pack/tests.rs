@@ -1,5 +1,6 @@
 //! Rigs to pack, and what must hold of the blobs.
 
+use super::proof::Rays;
 use super::*;
 use calib_rays::field::spline::{Spline, SplineGrid};
 use calib_rays::field::{
@@ -317,7 +318,7 @@ fn six_thousand_pixels_are_within_a_thousandth() {
     let bytes = AlignedBytes::from(bytes.as_slice());
     let proof = proof::prove(
         &big,
-        (&RayBlob::open(&bytes).unwrap(), 0),
+        Rays::Float(&RayBlob::open(&bytes).unwrap(), 0),
         600.0,
         5,
         &Silent,
@@ -334,6 +335,54 @@ pub fn parts() -> encode::BlobParts {
         self_tests: Vec::new(),
         pairs: Vec::new(),
         match_noise: None,
+        arithmetic: None,
+    }
+}
+
+/// Of 1280 px at a focal length of 1400 px, and of 6000 px at 6000 px.
+#[test]
+fn integers_are_proven_within_a_hundredth_and_their_answers_are_repeated() {
+    let pose = RigidTransform::new(
+        so3::exp(&Vector3::new(2.8, 0.5, -0.9)),
+        Vector3::new(100.0, 20.0, -600.0),
+    );
+    let big = camera(
+        "big",
+        distorted_field(SensorSize::new(6000, 4000), 6000.0),
+        pose,
+    );
+    let usual = vec![smooth_camera(), port_camera()];
+    for (cameras, bound_px, most_px) in [
+        (usual, 0.001, 0.004),
+        (vec![fisheye_camera()], 0.001, 0.002),
+        (vec![big], 0.002, 0.006),
+    ] {
+        for prefer in [Prefer::Size, Prefer::Speed] {
+            let settings = PackSettings {
+                prefer,
+                with_integers: true,
+                ..settings(bound_px)
+            };
+            let packed = pack(&rig(cameras.clone()), &settings).unwrap();
+            let error_px = packed.integer_error_px.unwrap();
+            assert!(error_px < most_px, "{prefer:?} {error_px}");
+            let bytes = AlignedBytes::from(packed.bytes.as_slice());
+            let blob = RayBlob::open(&bytes).unwrap();
+            let stated = blob.arithmetic().unwrap();
+            assert!(f64::from(stated.max_error_px) >= error_px);
+            let integers = proof::IntegerRig::prepare(&blob).unwrap();
+            let asked = blob.self_tests().filter(|test| test.answer_len() > 0);
+            assert_eq!(integers.run_self_tests(&blob), Ok(asked.count()));
+            // Without the section the blob is the same but for its end.
+            let plain = PackSettings {
+                with_integers: false,
+                ..settings
+            };
+            let plain = pack(&rig(cameras.clone()), &plain).unwrap();
+            assert_eq!(plain.integer_error_px, None);
+            let after = 8 + 8 + 4 * stated.answers.len();
+            assert_eq!(packed.bytes.len(), plain.bytes.len() + after);
+        }
     }
 }
 
@@ -348,7 +397,7 @@ fn the_proof_finds_an_error_that_was_put_in() {
         let bytes = AlignedBytes::from(bytes.as_slice());
         proof::prove(
             truth,
-            (&RayBlob::open(&bytes).unwrap(), 0),
+            Rays::Float(&RayBlob::open(&bytes).unwrap(), 0),
             600.0,
             9,
             &Silent,

@@ -2,7 +2,7 @@
 
 use super::encode::BlobParts;
 use super::packed::Tried;
-use super::proof::{self, Proof};
+use super::proof::{self, Proof, Rays};
 use super::quantized::{Number, OffsetPredictor, Predictors};
 use super::settings::PackSettings;
 use super::sizes::knot_count;
@@ -200,12 +200,12 @@ impl<'a> Trials<'a> {
         }
         let distance_mm = self.settings.working_distance_mm;
         let (camera, progress) = (self.camera, self.progress);
+        let rays = Rays::Float(blob, camera_idx);
         let edges = *trial
             .edges
-            .get_or_insert_with(|| proof::prove_edges(camera, blob, camera_idx, distance_mm));
-        let prove = |stride| {
-            proof::prove(camera, (blob, camera_idx), distance_mm, stride, progress).merged(edges)
-        };
+            .get_or_insert_with(|| proof::prove_edges(camera, rays, distance_mm));
+        let prove =
+            |stride| proof::prove(camera, rays, distance_mm, stride, progress).merged(edges);
         let stride = coarse_stride(calibrated_px);
         let coarse_px = calibrated_px / (stride * stride) as u64;
         if stride > 1 && trial.coarse.is_none() && self.work.afford_proof(coarse_px, calibrated_px)
@@ -327,6 +327,7 @@ fn prove_sample(
         self_tests: Vec::new(),
         pairs: Vec::new(),
         match_noise: None,
+        arithmetic: None,
     };
     let bytes = AlignedBytes::from(parts.encode_cameras(&[(camera, table)])?.as_slice());
     let blob = match RayBlob::open(&bytes) {
@@ -342,7 +343,7 @@ fn prove_sample(
     let distance_mm = settings.working_distance_mm;
     Ok(proof::prove(
         camera,
-        (&blob, 0),
+        Rays::Float(&blob, 0),
         distance_mm,
         stride,
         &Silent,

@@ -123,6 +123,10 @@ fn the_packer_still_writes_the_golden_blobs() {
     noisy.match_noise_px = Some(0.375);
     still_writes(&noisy, 4, "stereo-v4-small.rays", Prefer::Size);
     still_writes(&noisy, 4, "stereo-v4-fast.rays", Prefer::Speed);
+    for (name, prefer) in [("small", Prefer::Size), ("fast", Prefer::Speed)] {
+        let name = format!("stereo-v4-integer-{name}.rays");
+        still_writes_with(&golden_rig(), 4, &name, prefer, true);
+    }
     let cubic = "non-central-v3-cubic.rays";
     still_writes(&cubic_rig(), 3, cubic, Prefer::Size);
     let bytes = read_aligned(&Path::new(FOLDER).join(cubic)).unwrap();
@@ -164,6 +168,10 @@ fn quantized_tables(bytes: &[u8]) -> Vec<QuantizedHeader> {
 }
 
 fn still_writes(rig: &Rig, version: u16, name: &str, prefer: Prefer) {
+    still_writes_with(rig, version, name, prefer, false);
+}
+
+fn still_writes_with(rig: &Rig, version: u16, name: &str, prefer: Prefer, with_integers: bool) {
     let path = Path::new(FOLDER).join(name);
     let settings = PackSettings {
         max_error_px: 0.002,
@@ -173,6 +181,7 @@ fn still_writes(rig: &Rig, version: u16, name: &str, prefer: Prefer) {
             _ => b"golden stereo v4",
         },
         prefer,
+        with_integers,
         ..PackSettings::default()
     };
     let mut packed = pack(rig, &settings).unwrap().bytes;
@@ -203,6 +212,8 @@ fn still_writes(rig: &Rig, version: u16, name: &str, prefer: Prefer) {
     assert!(golden.uncertain_pairs().eq(fresh.uncertain_pairs()));
     assert_eq!(golden.match_noise(), fresh.match_noise());
     assert_eq!(golden.max_error_px(), fresh.max_error_px());
+    assert_eq!(golden.arithmetic(), fresh.arithmetic());
+    assert_eq!(golden.arithmetic().is_some(), with_integers);
     if golden.written_by() == fresh.written_by() {
         assert_eq!(std::fs::read(path).unwrap(), packed);
     }

@@ -7,6 +7,7 @@ use crate::storage::OTHER_PART;
 
 /// Why a frame or a request was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Refusal {
     /// More bytes than a frame may have came without a delimiter.
     Oversized {
@@ -105,6 +106,7 @@ pub enum Refusal {
 
 /// What of a camera, or of the rig, is not the device's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RigPart {
     /// The number of cameras.
     Count,
@@ -120,6 +122,7 @@ pub enum RigPart {
 
 /// What flash can fail to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FlashOperation {
     /// Reading.
     Read,

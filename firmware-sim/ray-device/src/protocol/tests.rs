@@ -60,6 +60,13 @@ fn bytes_of_requests() {
         matches: vec(&[asked]),
     };
     #[rustfmt::skip]
+    assert_bytes(&Request::MeasurePoints(vec(&[asked])), &[
+        10, 1,
+        0xac, 0x02,
+        0, 0, 0, 0x80, 0x3f, 0, 0, 0, 0xc0,
+        1, 0, 0, 0, 0x3f, 0, 0, 0xc0, 0x3f,
+    ]);
+    #[rustfmt::skip]
     assert_bytes(&Request::MeasureNoisy(noisy), &[
         9, 0, 0, 0, 0x3f, 1,    // measure with 0.5 px, one match
         0xac, 0x02,
@@ -227,10 +234,11 @@ fn bytes_of_answers() {
         rollbacks: 6,
         rig: None,
         gaps: None,
+        arithmetic: Arithmetic::Float,
     };
     assert_bytes(
         &Reply::Status(without.clone()),
-        &[2, 1, 2, 3, 1, 5, 0, 0, 1, 0, 4, 5, 6, 0, 0],
+        &[2, 1, 2, 3, 1, 5, 0, 0, 1, 0, 4, 5, 6, 0, 0, 0],
     );
     let camera = CameraStatus {
         name: name("l"),
@@ -263,6 +271,7 @@ fn bytes_of_answers() {
             cameras: vec(&[camera]),
         }),
         gaps: Some(GAPS),
+        arithmetic: Arithmetic::Integer,
         ..without
     };
     #[rustfmt::skip]
@@ -279,6 +288,7 @@ fn bytes_of_answers() {
         1, 1, b's', 1, 1, b'l', 0x80, 0x01, 100,
         1, 3, 0, 0, 0x80, 0xbf, 0, 0, 0, 0x40, 0, 0, 0x80, 0x40,
         1, 2, 0, 0, 0, 0x3f, 0, 0, 0x80, 0xbf, 0, 0, 0x80, 0x3f,
+        1,                      // in integers
     ]);
 }
 
@@ -434,6 +444,7 @@ fn longest_status() -> Status {
             }),
             ..GAPS
         }),
+        arithmetic: Arithmetic::Integer,
     }
 }
 
