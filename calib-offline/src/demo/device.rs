@@ -8,7 +8,7 @@ use calib_blob::matches::KnownMatches;
 use calib_rays::measure::Sighting;
 use firmware_sim::client::{ClientError, DeviceClient, FlashOptions};
 use firmware_sim::simulated::host::SimulatedDevice;
-use firmware_sim::simulated::qemu::{QemuDevice, QemuError, image_path, require_qemu};
+use firmware_sim::simulated::qemu::{DEVICE, QemuDevice, QemuError, require_qemu};
 use ray_device::protocol::Point;
 use ray_runtime::{MeasureError, PixelPoint, RayBlob};
 use serde::Serialize;
@@ -61,7 +61,7 @@ pub fn check_simulated(blob: &[u8], pairs: &[Pair]) -> Result<DeviceCheck, DemoE
 /// In words, why this machine has no such device, and what to do about it.
 pub fn check_cortex_m(blob: &[u8], pairs: &[Pair]) -> Result<DeviceCheck, String> {
     require_qemu().map_err(|error| error.to_string())?;
-    let image = image_path("device");
+    let image = DEVICE.image_path("device");
     if !image.is_file() {
         return Err(
             "the image is not built: scripts/install-embedded.sh, then firmware-sim qemu, once"
