@@ -165,7 +165,6 @@ pub trait Flash: NorFlash {
     ///
     /// # Errors
     /// If that cannot be told: the bytes then count as programmed.
-    #[inline(always)]
     fn is_blank(&mut self, start: u32, length: u32) -> Result<bool, Self::Error> {
         reads_as_erased(self, start, length)
     }
