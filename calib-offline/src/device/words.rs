@@ -145,6 +145,7 @@ mod tests {
             update: None,
             rig: None,
             gaps: None,
+            arithmetic: "f32",
         }
     }
 

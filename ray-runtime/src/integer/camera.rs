@@ -8,8 +8,8 @@ use super::product::product;
 use super::ray::{FixedPixel, Pose, Sample, ray};
 use super::spline;
 use crate::format::{
-    ALIGNMENT, Encoding, Form, QUANTIZED_HEADER_PAIRS, QuantizedHeader,
-    QuantizedMap, Record, coefficient_count, knots_len,
+    ALIGNMENT, Encoding, Form, QUANTIZED_HEADER_PAIRS, QuantizedHeader, QuantizedMap, Record,
+    coefficient_count, knots_len,
 };
 use crate::lookup::{HAS_PATCHES, HAS_QUANTIZED, HAS_SPLINES, Views};
 
