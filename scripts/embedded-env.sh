@@ -3,6 +3,7 @@
 #   embedded_available TARGET...   prints those of the targets for which there is a toolchain, and says which are left out
 #   embedded_env TARGET...   sets EMBEDDED_CARGO and exports what a build for these targets needs; returns 1 with the
 #                            remedy on standard error if there is no toolchain
+# EMBEDDED_RUSTFLAGS in the environment goes to the compiler for these targets, such as "-C target-feature=+dsp".
 #
 # Two kinds of toolchain serve, in this order:
 #   1. rustup, when the targets have been added to the toolchain in use;
@@ -74,10 +75,23 @@ embedded: no toolchain for $*. Install one of
 END
 }
 
+# What a linker and flags are handed over in: LINKER FLAGS TARGET...
+embedded_flags() {
+  local linker=$1 flags="$2 ${EMBEDDED_RUSTFLAGS:-}" target name
+  shift 2
+  for target in "$@"; do
+    name=${target^^}
+    name=${name//[-.]/_}
+    if [ -n "$linker" ]; then export "CARGO_TARGET_${name}_LINKER=$linker"; fi
+    if [ -n "${flags// /}" ]; then export "CARGO_TARGET_${name}_RUSTFLAGS=$flags"; fi
+  done
+}
+
 embedded_env() {
   local target all=1 release linker sysroot
   for target in "$@"; do embedded_has_rustup_target "$target" || all=0; done
   if [ $all = 1 ]; then
+    embedded_flags "" "" "$@"
     EMBEDDED_CARGO=cargo
     echo "embedded: rustup, $(rustc --version)" >&2
     return 0
@@ -92,10 +106,6 @@ embedded_env() {
   unset RUSTUP_TOOLCHAIN
   sysroot=$embedded_target_dir/sysroot-$release
   "$repository/scripts/mk-sysroot.sh" "$sysroot" "$@" || return 1
-  for target in "$@"; do
-    local name=${target^^}
-    name=${name//[-.]/_}
-    export "CARGO_TARGET_${name}_LINKER=$linker" "CARGO_TARGET_${name}_RUSTFLAGS=--sysroot=$sysroot"
-  done
+  embedded_flags "$linker" "--sysroot=$sysroot" "$@"
   echo "embedded: Debian's rustc $release, linker $linker" >&2
 }

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs what the Cortex-M images and the C and C++ interface need and this machine lacks: QEMU, a toolchain for bare-metal Arm, a C
-# compiler for it without a C library (the example of ray-runtime/c needs none), and a second C++ compiler. Says what it does, and does nothing when all is there. On Debian through apt-get, as root or with sudo; elsewhere it tries
+# compiler for it without a C library (the example of ray-runtime/c needs none), a second C++ compiler, CMake and pkg-config. Says what it does, and does nothing when all is there. On Debian through apt-get, as root or with sudo; elsewhere it tries
 # `rustup target add` for the toolchain and names the packages for the rest.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/embedded-env.sh"
@@ -16,12 +16,14 @@ packages=()
 command -v qemu-system-arm >/dev/null || packages+=(qemu-system-arm)
 command -v arm-none-eabi-gcc >/dev/null || packages+=(gcc-arm-none-eabi)
 command -v clang++ >/dev/null || packages+=(clang)
+command -v cmake >/dev/null || packages+=(cmake make)
+command -v pkg-config >/dev/null || packages+=(pkg-config)
 if ! has_toolchain; then
   # The four belong together: compiler and sources must be of one release, so those already there are brought along.
   packages+=(rustc-web cargo-web rust-web-src lld)
 fi
 if [ ${#packages[@]} = 0 ]; then
-  echo "install-embedded: QEMU, a bare-metal toolchain, a C compiler for it and clang++ are there already"
+  echo "install-embedded: QEMU, a bare-metal toolchain, a C compiler for it, clang++, CMake and pkg-config are there already"
   exit 0
 fi
 
@@ -51,6 +53,9 @@ fi
 if ! command -v clang++ >/dev/null; then
   # So does one.
   echo "install-embedded: no clang++, so rays.hpp is tried with g++ alone: install clang" >&2
+fi
+if ! command -v cmake >/dev/null || ! command -v pkg-config >/dev/null; then
+  echo "install-embedded: no CMake or no pkg-config, so the packages of the C library are not tried: install both" >&2
 fi
 if ! has_toolchain; then
   embedded_no_toolchain "${targets[@]}"

@@ -3,22 +3,33 @@
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use firmware_cost::{Images, ImagesError};
-use firmware_sim::simulated::qemu;
+use firmware_cost::{Core, Images, ImagesError};
+use firmware_sim::simulated::qemu::{self, Emulated};
 
 pub struct InQemu;
 
+fn emulated(core: &Core) -> Emulated<'_> {
+    Emulated {
+        target: core.target,
+        flags: core.flags,
+        emulator: core.emulator,
+        machine: core.machine,
+        cpu: core.cpu,
+        stored_at: core.stored_at,
+    }
+}
+
 impl Images for InQemu {
-    fn qemu_version(&self) -> Result<String, ImagesError> {
-        Ok(qemu::version()?)
+    fn qemu_version(&self, core: &Core) -> Result<String, ImagesError> {
+        Ok(qemu::version_of(core.emulator)?)
     }
 
-    fn build(&self, names: &[&str]) -> Result<(), ImagesError> {
-        Ok(qemu::build_images(names)?)
+    fn build(&self, core: &Core, names: &[&str]) -> Result<(), ImagesError> {
+        Ok(emulated(core).build(names)?)
     }
 
-    fn path(&self, name: &str) -> PathBuf {
-        qemu::image_path(name)
+    fn path(&self, core: &Core, name: &str) -> PathBuf {
+        emulated(core).image_path(name)
     }
 
     fn build_newest_only(&self, name: &str) -> Result<PathBuf, ImagesError> {
@@ -27,10 +38,11 @@ impl Images for InQemu {
 
     fn run_counting(
         &self,
+        core: &Core,
         image: &Path,
         flash: &Path,
         time_shift: u32,
     ) -> Result<Output, ImagesError> {
-        Ok(qemu::run_counting(image, flash, time_shift)?)
+        Ok(emulated(core).run_counting(image, flash, time_shift)?)
     }
 }

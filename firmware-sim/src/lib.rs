@@ -3,3 +3,5 @@
 #[cfg(feature = "client")]
 pub mod client;
 pub mod simulated;
+#[cfg(feature = "simulated")]
+pub mod slot_image;

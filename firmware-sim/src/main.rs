@@ -7,14 +7,15 @@ use std::io::Write;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::str::FromStr;
 
 use clap::{Parser, Subcommand};
 use cost::InQemu;
+use firmware_cost::{CORES, Core};
 use firmware_sim::simulated::flash_file::{self, FlashFile};
 use firmware_sim::simulated::host::SimulatedDevice;
 use firmware_sim::simulated::qemu::{self, QemuDevice};
-use firmware_sim::simulated::sim_flash::Rules;
+use firmware_sim::simulated::sim_flash::{BadRules, Rules};
+use firmware_sim::slot_image::Part;
 use ray_device::protocol::{Arithmetic, CameraStatus, MAX_CAMERAS_LISTED, MAX_NAME, Rig, name};
 use ray_device::storage::trust::{PublicKey, Trust};
 
@@ -34,12 +35,12 @@ enum Command {
     Host {
         #[command(flatten)]
         device: DeviceArguments,
-        /// The rules of the part that its flash is, with commas between: unit=N and block=N, bytes that are programmed
+        /// The rules of the part that its flash is: a part that slot images are made for, such as stm32h743, or, with commas between, unit=N and block=N, bytes that are programmed
         /// (1 to 512) and erased at once (8 and 4096 if not given); erased=00 or ff; ecc=error or fault: what a
         /// word that a cut of power spoiled does when it is read; blank=fault or undefined: the same of a
         /// blank word; log-block=N: logs lie in regions with erase blocks of their own; erase=none: no erase is
         /// needed; stall-ms=N: how long an erase takes. A flash file keeps its rules.
-        #[arg(long, value_name = "RULES", value_parser = Rules::from_str)]
+        #[arg(long, value_name = "RULES", value_parser = flash_rules)]
         flash_rules: Option<Rules>,
         /// What it computes points in; integer is for cores without a floating-point unit.
         #[arg(long, value_enum, default_value = "f32")]
@@ -54,16 +55,19 @@ enum Command {
         #[arg(long, value_name = "ELF", conflicts_with = "public_key")]
         image: Option<PathBuf>,
     },
-    /// What the runtime costs on a Cortex-M4F: instructions counted in QEMU, stack, code. The images
+    /// What the runtime costs on a Cortex-M4F, or on other cores: instructions counted in QEMU, stack, code. The images
     /// are built first when they are missing or stale.
     Cost {
+        /// Count on the cores of this target alone, such as thumbv6m-none-eabi, and no code.
+        #[arg(long, value_name = "TARGET", value_parser = Core::targets(), conflicts_with = "markdown")]
+        target: Option<String>,
         /// Count this blob, instead of those that come with the sources.
         #[arg(long = "blob", value_name = "FILE")]
         blobs: Vec<PathBuf>,
         /// One JSON object instead of tables.
         #[arg(long)]
         json: bool,
-        /// The document ray-runtime/COST.md instead of tables.
+        /// The document ray-runtime/COST.md instead of tables: with all cores, whose images take some minutes to build.
         #[arg(long, conflicts_with = "json")]
         markdown: bool,
     },
@@ -131,6 +135,10 @@ impl DeviceArguments {
     }
 }
 
+fn flash_rules(text: &str) -> Result<Rules, BadRules> {
+    Part::of_name(text).map_or_else(|| text.parse(), |part| Ok(part.rules))
+}
+
 fn public_key(text: &str) -> Result<PublicKey, String> {
     PublicKey::from_hex(text)
         .ok_or_else(|| "give the key's 32 bytes as 64 hexadecimal digits".to_owned())
@@ -191,21 +199,37 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         } => run_on_host(device, *flash_rules, *arithmetic),
         Command::Qemu { device, image } => run_in_qemu(device, image.as_deref()),
         Command::Cost {
+            target,
             blobs,
             json,
             markdown,
         } => {
-            let cost = if blobs.is_empty() {
-                firmware_cost::measure(&InQemu, &firmware_cost::built_in())?
+            let usual = firmware_cost::usual(&firmware_cost::built_in());
+            let all = if blobs.is_empty() {
+                firmware_cost::built_in()
             } else {
-                firmware_cost::measure(&InQemu, blobs)?
+                blobs.clone()
             };
-            let text = if *json {
-                serde_json::to_string_pretty(&cost)? + "\n"
-            } else if *markdown {
-                cost.to_markdown()
+            let text = if let Some(target) = target {
+                let blobs = if blobs.is_empty() { &usual } else { blobs };
+                let cores = Core::of_target(target);
+                let across = firmware_cost::across(&InQemu, &cores, blobs)?;
+                if *json {
+                    serde_json::to_string_pretty(&across)? + "\n"
+                } else {
+                    across.to_text()
+                }
             } else {
-                cost.to_text()
+                let cost = firmware_cost::measure(&InQemu, &all)?;
+                if *json {
+                    serde_json::to_string_pretty(&cost)? + "\n"
+                } else if *markdown {
+                    let blobs = if blobs.is_empty() { &usual } else { blobs };
+                    let across = firmware_cost::across(&InQemu, &CORES, blobs)?;
+                    cost.to_markdown(&across)
+                } else {
+                    cost.to_text()
+                }
             };
             std::io::stdout()
                 .write_all(text.as_bytes())

@@ -42,8 +42,29 @@ static float random_px(int extent_px)
     return (float)(int32_t)((random_state >> 8) % (uint32_t)((extent_px + 1) << 14)) / 16384.0f - 1.0f;
 }
 
+/* What the blob says of itself. */
+static int print_info(void)
+{
+    rays_info info;
+    int code = rays_info_of(&rig, &info);
+    print("info");
+    print_code(code);
+    if (code == RAYS_OK) {
+        print(" ");
+        for (size_t k = 0; k < sizeof info.identity; k++) {
+            print_number(info.identity[k], 2);
+        }
+        print_bits(&info.max_error_px, 1);
+        print_bits(&info.working_distance_mm, 1);
+        print(" ");
+        print_number((uint32_t)info.blob_len, 8);
+    }
+    print(rays_version() == RAYS_VERSION ? ", header and library agree\n" : ", header and library differ\n");
+    return code;
+}
+
 /* Where the second camera would see the point of a match, and where the first pixel's ray runs there. */
-static void print_search(rays_sighting first, const rays_point *point)
+static void print_search(rays_sighting first, rays_sighting second, const rays_point *point)
 {
     enum { STEPS = 8 };
     rays_pixel pixel, near;
@@ -66,6 +87,14 @@ static void print_search(rays_sighting first, const rays_point *point)
         print_bits(&curve[k].pixel.u_px, 1);
         print_bits(&curve[k].pixel.v_px, 1);
         print_bits(curve[k].point_mm, 3);
+    }
+    /* A camera may see a point twice, as it does in a mirror; here it stands for a third one. */
+    const rays_sighting sightings[3] = {first, second, {1, second.u_px + 0.5f, second.v_px - 0.25f}};
+    rays_point nearest;
+    print_code(code = rays_triangulate_many(&rig, sightings, 3, &nearest));
+    if (code == RAYS_OK) {
+        print_bits(nearest.point_mm, 3);
+        print_bits(&nearest.gap_squared_mm2, 1);
     }
 }
 
@@ -118,6 +147,9 @@ int example(void)
     if (code != RAYS_OK) {
         return 1;
     }
+    if (print_info() != RAYS_OK) {
+        return 1;
+    }
     print_window();
     for (int k = 0; k < 4000; k++) {
         rays_sighting first = {0, 0, 0}, second = {1, 0, 0};
@@ -140,13 +172,15 @@ int example(void)
             print_bits(&point.gap_squared_mm2, 1);
         }
         if (code == RAYS_OK && k % 32 == 0) {
-            print_search(first, &point);
+            print_search(first, second, &point);
         }
         print_code(code = rays_triangulate_with_covariance(&rig, first, second, &measurement));
         if (code == RAYS_OK) {
             print_bits(measurement.point_mm, 3);
             print_bits(&measurement.gap_squared_mm2, 1);
             print_bits(measurement.sigma_mm, measurement.has_sigma ? 3 : 0);
+            print_bits(&measurement.gap_mm, 1);
+            print_bits(&measurement.gap_variance_mm2, 1);
         }
         if (code == RAYS_OK && k % 32 == 0) {
             print_code(code = rays_triangulate_with_noise(&rig, first, second, 0.375f, &measurement));

@@ -50,7 +50,7 @@ private:
 };
 
 /* Where the second camera would see the point of a match, and where the first pixel's ray runs there. */
-void print_search(const rays::rig &rig, rays::sighting first, const rays::point &point)
+void print_search(const rays::rig &rig, rays::sighting first, rays::sighting second, const rays::point &point)
 {
     const auto pixel = rig.project(1, point.point_mm);
     if (print_code(pixel)) {
@@ -68,6 +68,29 @@ void print_search(const rays::rig &rig, rays::sighting first, const rays::point 
             print_bits(at.point_mm);
         }
     }
+    const rays::sighting sightings[] = {first, second, {1, second.u_px + 0.5f, second.v_px - 0.25f}};
+    const auto nearest = rig.triangulate_many(sightings);
+    if (print_code(nearest)) {
+        print_bits(nearest->point_mm);
+        print_bits({&nearest->gap_squared_mm2, 1});
+    }
+}
+
+/* What the blob says of itself. */
+void print_info(const rays::rig &rig)
+{
+    const auto info = rig.info();
+    std::printf("info");
+    if (print_code(info)) {
+        std::printf(" ");
+        for (const uint8_t byte : info->identity) {
+            std::printf("%02x", static_cast<unsigned>(byte));
+        }
+        const float numbers[] = {info->max_error_px, info->working_distance_mm};
+        print_bits(numbers);
+        std::printf(" %08x", static_cast<unsigned>(info->blob_len));
+    }
+    std::printf(", header and library %s\n", rays_version() == RAYS_VERSION ? "agree" : "differ");
 }
 
 /* The rows below the middle of the second camera's sensor, two by two pixels joined. */
@@ -122,6 +145,7 @@ int main(int count, char **arguments)
     const auto tests = rig.self_test();
     std::printf("cameras %02x, self-tests %02x %s\n", static_cast<unsigned>(rig.camera_count()),
                 static_cast<unsigned>(tests.value_or(0)), tests ? "passed" : "failed");
+    print_info(rig);
     print_window(rig);
     random_pixels pixels;
     std::vector<rays::pixel> firsts, seconds;
@@ -141,7 +165,7 @@ int main(int count, char **arguments)
             print_bits(point->point_mm);
             print_bits({&point->gap_squared_mm2, 1});
             if (k % 32 == 0) {
-                print_search(rig, first, *point);
+                print_search(rig, first, second, *point);
             }
         }
         const auto measured = rig.triangulate_with_covariance(first, second);
@@ -149,6 +173,8 @@ int main(int count, char **arguments)
             print_bits(measured->point_mm);
             print_bits({&measured->gap_squared_mm2, 1});
             print_bits({measured->sigma_mm, measured->has_sigma ? 3u : 0u});
+            const float gap[] = {measured->gap_mm, measured->gap_variance_mm2};
+            print_bits(gap);
             if (k % 32 == 0) {
                 const auto noisy = rig.triangulate_with_noise(first, second, 0.375f);
                 if (print_code(noisy)) {

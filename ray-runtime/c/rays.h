@@ -20,6 +20,12 @@
 extern "C" {
 #endif
 
+/* The version of this header, and of the library it belongs to: rays_version() tells whether the two fit. */
+#define RAYS_VERSION_MAJOR 0
+#define RAYS_VERSION_MINOR 1
+#define RAYS_VERSION_PATCH 0
+#define RAYS_VERSION (10000 * RAYS_VERSION_MAJOR + 100 * RAYS_VERSION_MINOR + RAYS_VERSION_PATCH)
+
 /* Codes never change their meaning; later versions may add some. */
 enum {
     RAYS_OK = 0,
@@ -40,10 +46,12 @@ enum {
     RAYS_BAD_PAIR = 13,
     RAYS_BAD_SECTION = 14,
     RAYS_UNKNOWN_SECTION = 15, /* it says what must be understood to answer rightly, and this library does not */
+    RAYS_WRONG_ROUNDING = 16,  /* the processor does not round to nearest: set it so; nothing is wrong with the blob */
 
     /* Why a question has no answer. */
     RAYS_OUTSIDE = 64,         /* a pixel outside of its camera's calibrated area, or not a number */
     RAYS_NO_SUCH_CAMERA = 65,
+    RAYS_TOO_FEW_RAYS = 66,    /* fewer than two sightings */
     RAYS_PARALLEL = 67,        /* the rays are parallel within 0.0002 rad */
     RAYS_BEHIND = 68,          /* the rays meet behind a camera */
     RAYS_UNSEEN = 69,          /* no pixel of the calibrated area was found to see the point */
@@ -62,6 +70,16 @@ enum {
 typedef struct {
     const void *opaque[32];
 } rays_rig;
+
+/* What a blob says of itself. The identity is a hash of the calibration: two blobs with the same one hold the same calibration,
+ * however they are packed. max_error_px is the proven bound of what packing costs at any calibrated pixel, along the sensor;
+ * working_distance_mm is where the calibration was made. */
+typedef struct {
+    uint8_t identity[16];
+    float max_error_px;
+    float working_distance_mm;
+    size_t blob_len;
+} rays_info;
 
 /* A place on a sensor or an image. */
 typedef struct {
@@ -97,12 +115,17 @@ typedef struct {
 } rays_point;
 
 /* The same with the standard deviation along x, y and z: what the calibration leaves open and the pixels' noise.
- * has_sigma is 0, and sigma_mm too, where the blob says nothing of the uncertainty of these two cameras. */
+ * has_sigma is 0, and sigma_mm too, where the blob says nothing of the uncertainty of these two cameras.
+ * gap_mm is the gap with its sign, positive where the second camera's ray is above the first's, and gap_variance_mm2 (0 without sigma)
+ * what its square should be on average. Gaps that are often larger, or mostly of one sign, say that the rig is no longer the
+ * calibrated one: rays_health of rays_device.h keeps the count. */
 typedef struct {
     float point_mm[3];
     float gap_squared_mm2;
     float sigma_mm[3];
     int has_sigma;
+    float gap_mm;
+    float gap_variance_mm2;
 } rays_measurement;
 
 /* A point on the ray of a pixel, and where another camera sees it. */
@@ -131,6 +154,11 @@ int rays_stated_len(const void *bytes, size_t length, uint32_t *stated_len);
 /* Checks the whole blob, `length` bytes and no more, and opens it in place. One pass over it. */
 int rays_open(rays_rig *rig, const void *blob, size_t length);
 
+/* RAYS_VERSION of the library. */
+uint32_t rays_version(void);
+
+int rays_info_of(const rays_rig *rig, rays_info *info);
+
 /* 0 if the rig is not open. */
 size_t rays_camera_count(const rays_rig *rig);
 
@@ -139,6 +167,10 @@ int rays_camera_of(const rays_rig *rig, size_t camera, rays_camera *info);
 int rays_lookup(const rays_rig *rig, rays_sighting sighting, rays_ray *ray);
 
 int rays_triangulate(const rays_rig *rig, rays_sighting first, rays_sighting second, rays_point *point);
+
+/* The point nearest to the rays of `count` sightings, two or more, by least squares; gap_squared_mm2 is four times the mean square of its
+ * distances from them. Two give the bits of rays_triangulate. Each ray is looked up about five times. */
+int rays_triangulate_many(const rays_rig *rig, const rays_sighting *sightings, size_t count, rays_point *point);
 
 /* About four times the work of rays_triangulate, whose bits the point has. */
 int rays_triangulate_with_covariance(const rays_rig *rig, rays_sighting first, rays_sighting second,

@@ -49,8 +49,10 @@ enum class code : int {
     bad_pair = RAYS_BAD_PAIR,
     bad_section = RAYS_BAD_SECTION,
     unknown_section = RAYS_UNKNOWN_SECTION,
+    wrong_rounding = RAYS_WRONG_ROUNDING,
     outside = RAYS_OUTSIDE,
     no_such_camera = RAYS_NO_SUCH_CAMERA,
+    too_few_rays = RAYS_TOO_FEW_RAYS,
     parallel = RAYS_PARALLEL,
     behind = RAYS_BEHIND,
     unseen = RAYS_UNSEEN,
@@ -83,8 +85,10 @@ inline const char *words(code found) noexcept
     case code::bad_pair:
     case code::bad_section: return "the blob is not what its format says";
     case code::unknown_section: return "the blob says what must be understood, and this library does not";
+    case code::wrong_rounding: return "the processor does not round to nearest; nothing is wrong with the blob";
     case code::outside: return "a pixel outside of the calibrated area";
     case code::no_such_camera: return "no such camera";
+    case code::too_few_rays: return "fewer than two sightings";
     case code::parallel: return "the rays are parallel";
     case code::behind: return "the rays meet behind a camera";
     case code::unseen: return "no calibrated pixel sees the point";
@@ -183,6 +187,7 @@ using point = rays_point;
 using measurement = rays_measurement;
 using curve_point = rays_curve_point;
 using readout = rays_readout;
+using info = rays_info;
 
 /* A camera of a blob. The name has no zero at its end; it lies in the blob. */
 struct camera {
@@ -239,6 +244,14 @@ public:
         return detail::answer(found, rays::camera{{info.name, info.name_len}, info.sensor_width_px, info.sensor_height_px});
     }
 
+    /* The calibration's identity, and what packing it cost. */
+    result<rays::info> info() const noexcept
+    {
+        rays::info found = {};
+        const int why = rays_info_of(&rig_, &found);
+        return detail::answer(why, found);
+    }
+
     result<ray> lookup(sighting at) const noexcept
     {
         ray found = {};
@@ -250,6 +263,14 @@ public:
     {
         point found = {};
         const int why = rays_triangulate(&rig_, first, second, &found);
+        return detail::answer(why, found);
+    }
+
+    /* Of two sightings or more, by least squares. */
+    result<point> triangulate_many(span<const sighting> sightings) const noexcept
+    {
+        point found = {};
+        const int why = rays_triangulate_many(&rig_, sightings.data(), sightings.size(), &found);
         return detail::answer(why, found);
     }
 

@@ -9,7 +9,7 @@
 ///
 /// static RIG: &Aligned<[u8]> = &Aligned(*include_bytes!(concat!(
 ///     env!("CARGO_MANIFEST_DIR"),
-///     "/../data/golden/stereo-v3-small.rays"
+///     "/example.rays"
 /// )));
 ///
 /// let rig = RayBlob::open(&RIG.0).unwrap();

@@ -16,6 +16,7 @@ use crate::format::{
 };
 use crate::lookup::Views;
 use crate::match_noise::MatchNoise;
+use crate::rounding::wrong_rounding;
 use crate::self_test::SelfTests;
 use crate::triangulate::{self, Triangulation};
 use crate::uncertainty::{Measurement, Pair};
@@ -72,6 +73,10 @@ impl<'a> RayBlob<'a> {
             return Err(OpenError::Misaligned {
                 offset: misalignment as u8,
             });
+        }
+        // Before any number is checked against what it should be.
+        if let Some(found) = wrong_rounding() {
+            return Err(OpenError::WrongRounding { found });
         }
         let pairs = bytemuck::try_cast_slice(bytes).map_err(|_| OpenError::BadHeader)?;
         let meta_end = HEADER_LEN.saturating_add(header.meta_len as usize);
@@ -330,16 +335,17 @@ impl<'a> RayBlob<'a> {
     /// The point nearest to the rays of any number of cameras, by least squares. Two give the
     /// bits of [`RayBlob::triangulate`].
     ///
-    /// Nothing is stored, so each ray is looked up about five times if there are more than two.
+    /// Nothing is stored, so each ray is looked up about five times if there are more than two. A sighting is a
+    /// camera and a pixel, or whatever becomes such a pair.
     ///
     /// # Errors
     /// Any [`MeasureError`].
-    pub fn triangulate_many(
+    pub fn triangulate_many<S: Copy + Into<(usize, PixelPoint)>>(
         &self,
-        sightings: &[(usize, PixelPoint)],
+        sightings: &[S],
     ) -> Result<Triangulation, MeasureError> {
         triangulate::triangulate_many(sightings.len(), |k| match sightings.get(k) {
-            Some(&sighting) => self.sighting(sighting),
+            Some(&sighting) => self.sighting(sighting.into()),
             None => Err(MeasureError::TooFewRays { have: k }),
         })
     }

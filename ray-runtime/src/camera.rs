@@ -4,6 +4,7 @@ use crate::format::{CameraMeta, Encoding, Form, Record};
 
 /// A camera of a blob.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Camera<'a> {
     /// Unique in the blob.
     pub name: &'a str,
@@ -25,6 +26,7 @@ pub struct Camera<'a> {
 
 /// A rectangle of sensor pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Region {
     /// First column, px.
     pub u: u32,
@@ -38,6 +40,7 @@ pub struct Region {
 
 /// `point_in_rig = rotation * point_in_camera + translation_mm`.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RigFromCamera {
     /// Row by row; orthonormal to f32 round-off.
     pub rotation: [[f32; 3]; 3],

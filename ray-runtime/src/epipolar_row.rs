@@ -7,6 +7,7 @@ use crate::{EpipolarCurve, LookupError, PixelPoint, RayBlob, Row};
 // As C sees it, four numbers.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct EpipolarRun {
     /// Of the furthest point that the other camera sees.
     pub far: PixelPoint,

@@ -4,8 +4,11 @@
 //! One code space for the whole crate: 1 to 63 a blob that does not open, 64 to 127 a question
 //! that has no answer. Codes are never reused.
 
+use crate::rounding::Rounding;
+
 /// Which part of the blob an [`OpenError`] speaks of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Table {
     /// The working numbers of a camera.
     Record,
@@ -17,6 +20,7 @@ pub enum Table {
 
 /// Why bytes are not a blob that this version reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum OpenError {
     /// There are fewer bytes than the header states (or than a header has).
@@ -112,6 +116,12 @@ pub enum OpenError {
         /// Its tag.
         tag: u16,
     },
+    /// The processor does not round to nearest, ties to even, so that its answers would be others. Nothing is wrong
+    /// with the blob: set the mode before it is opened, and leave it.
+    WrongRounding {
+        /// What it does.
+        found: Rounding,
+    },
 }
 
 impl OpenError {
@@ -133,6 +143,7 @@ impl OpenError {
             Self::BadPair { .. } => 13,
             Self::BadSection { .. } => 14,
             Self::UnknownSection { .. } => 15,
+            Self::WrongRounding { .. } => 16,
             Self::FormLeftOut { .. } => 17,
         }
     }
@@ -140,6 +151,7 @@ impl OpenError {
 
 /// Why a pixel has no ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum LookupError {
     /// The pixel lies outside the calibrated area, or is not a number.
@@ -165,6 +177,7 @@ impl LookupError {
 
 /// Why a match has no point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum MeasureError {
     /// A pixel lies outside its camera's calibrated area, or is not a number.
@@ -213,6 +226,7 @@ impl MeasureError {
 
 /// Why a point has no pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ProjectError {
     /// No pixel of the camera's calibrated area was found to see the point.
@@ -247,6 +261,7 @@ impl From<LookupError> for ProjectError {
 
 /// Why what a sensor delivers cannot be mapped to the pixels of the calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ReadoutError {
     /// The camera was calibrated on a sensor of another size. Nothing is ever scaled.
@@ -328,8 +343,11 @@ mod tests {
             OpenError::BadPair { pair: 0 },
             OpenError::BadSection { section: 0 },
             OpenError::UnknownSection { tag: 2 },
+            OpenError::WrongRounding {
+                found: Rounding::TowardZero,
+            },
         ];
-        assert!(open.iter().map(|e| e.code()).eq(1..=15));
+        assert!(open.iter().map(|e| e.code()).eq(1..=16));
         let left_out = OpenError::FormLeftOut {
             camera: 0,
             found: 0,

@@ -30,6 +30,7 @@ mod polynomial;
 mod project;
 mod quantized;
 mod ray;
+mod rounding;
 mod row;
 mod self_test;
 mod sensor_window;
@@ -47,6 +48,7 @@ pub use error::{LookupError, MeasureError, OpenError, ProjectError, ReadoutError
 pub use match_noise::MatchNoise;
 pub use project::{EpipolarCurve, EpipolarPoint};
 pub use ray::{PixelPoint, Ray};
+pub use rounding::Rounding;
 pub use row::{Matched, Row, RowPoint};
 pub use self_test::{SelfTestFailure, SelfTests};
 pub use sensor_window::{Readout, SensorWindow};

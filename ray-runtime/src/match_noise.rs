@@ -4,6 +4,7 @@
 ///
 /// A matcher is no corner finder: what the calibration knows of its corners' noise says nothing of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MatchNoise {
     px: f32,
 }

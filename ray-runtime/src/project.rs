@@ -99,6 +99,7 @@ impl RayBlob<'_> {
 
 /// A point of an [`EpipolarCurve`].
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct EpipolarPoint {
     /// Where the other camera sees it.
     pub pixel: PixelPoint,

@@ -3,6 +3,7 @@
 /// A point on the sensor, px: the center of the top-left pixel is (0, 0), u right, v down.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PixelPoint {
     /// To the right.
     pub u: f32,
@@ -20,6 +21,7 @@ impl PixelPoint {
 /// The points `origin_mm + lambda * direction`, lambda > 0 in front of the camera; rig frame.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ray {
     /// The point of the ray nearest to its camera's reference point (its foot point), mm. The
     /// rays of a central camera all start in the same point.

@@ -10,6 +10,7 @@ use crate::{LookupError, MeasureError, PixelPoint, Ray, RayBlob, triangulate_pai
 ///
 /// Pixel `k` is at `(first.u + (k * step_px) as f32, first.v)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Row {
     /// The first of them, px of the sensor.
     pub first: PixelPoint,
@@ -33,6 +34,7 @@ pub enum Matched<'a> {
 // As C sees it: five words.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RowPoint {
     /// Rig frame, mm; without a point not a number.
     pub point_mm: [f32; 3],

@@ -24,6 +24,7 @@ impl Iterator for SelfTests<'_> {
 
 /// The first self-test that did not give the bits it should.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SelfTestFailure {
     /// Number of the test, from 0.
     pub test: usize,

@@ -4,6 +4,7 @@ use crate::{Camera, PixelPoint, ReadoutError};
 
 /// What of a sensor is read out: a region of interest, and how many pixels are joined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Readout {
     /// Columns and rows of the whole sensor, px.
     pub sensor: [u32; 2],
@@ -23,6 +24,7 @@ pub struct Readout {
 // As C sees it, six numbers: the C interface passes it by value.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SensorWindow {
     /// Sensor coordinates of the image's pixel (0, 0), px.
     origin_px: [f32; 2],

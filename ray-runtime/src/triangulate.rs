@@ -14,6 +14,7 @@ const MIN_PARALLAX_SIN_SQUARED: f32 = MIN_PARALLAX_SIN * MIN_PARALLAX_SIN;
 
 /// A triangulated point.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Triangulation {
     /// Rig frame, mm.
     pub point_mm: [f32; 3],

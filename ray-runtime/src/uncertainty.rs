@@ -16,6 +16,7 @@ use crate::vector::Vector;
 
 /// Covariance of a triangulated point, rig frame; matrices are symmetric.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PointCovariance {
     /// From what the calibration leaves uncertain, mm^2. The same for every measurement with the
     /// same pixels: no averaging makes it smaller.
@@ -51,6 +52,7 @@ impl PointCovariance {
 
 /// A triangulated point with what is known of its error.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Measurement {
     /// The point and the gap.
     pub found: Triangulation,

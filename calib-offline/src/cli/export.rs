@@ -9,6 +9,7 @@ use super::export_help::{EXAMPLE, FORMATS};
 use super::export_loss::LossObject;
 use super::export_mesh::{self, MeshArgs, MeshLoss};
 use super::export_options::FolderArgs;
+use super::export_slot::{self, SlotArgs, SlotObject};
 use super::output::Console;
 use super::place::check_file;
 use super::rig_file::{RigFile, open};
@@ -37,6 +38,9 @@ pub struct ExportArgs {
     /// What the forms of one file take.
     #[command(flatten)]
     pub blob: BlobArgs,
+    /// What the image of a slot takes.
+    #[command(flatten)]
+    pub slot: SlotArgs,
     /// What the forms of other tools take.
     #[command(flatten)]
     pub folder: FolderArgs,
@@ -59,6 +63,8 @@ pub enum FormatArg {
     Bin,
     /// C source
     C,
+    /// What a production line writes into a device's flash, so that it starts with the blob
+    SlotImage,
     /// `OpenCV`'s `FileStorage`.
     #[value(name = "opencv", help = "OpenCV's FileStorage, a folder")]
     OpenCv,
@@ -111,6 +117,7 @@ impl FormatArg {
             Self::Uf2 => "uf2",
             Self::Bin => "bin",
             Self::C => "c",
+            Self::SlotImage => "slot-image",
             Self::OpenCv => "opencv",
             Self::Kalibr => "kalibr",
             Self::Ros => "ros",
@@ -136,6 +143,7 @@ impl FormatArg {
             Self::Uf2 => Kind::File(b"UF2\n"),
             Self::Bin => Kind::File(&ray_runtime::format::MAGIC),
             Self::C => Kind::File(b"/* A ray blob"),
+            Self::SlotImage => Kind::Slot,
             Self::OpenCv => Kind::Folder(FolderForm::OpenCv),
             Self::Kalibr => Kind::Folder(FolderForm::Kalibr),
             Self::Ros => Kind::Folder(FolderForm::Ros),
@@ -159,6 +167,7 @@ impl FormatArg {
 enum Kind {
     /// How every file of the form begins.
     File(&'static [u8]),
+    Slot,
     Folder(FolderForm),
     Mesh(MeshFormat),
     Points,
@@ -180,6 +189,7 @@ struct ExportObject<'a> {
     files: Option<&'a [PathBuf]>,
     loss: Option<LossOf<'a>>,
     points: Option<PointsObject>,
+    slot: Option<&'a SlotObject>,
 }
 
 /// Whose loss.
@@ -205,6 +215,7 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<Outcome, Error> {
     check_options(args)?;
     match args.format.kind() {
         Kind::File(start) => write_file(args, start, console),
+        Kind::Slot => export_slot::write(args, console),
         Kind::Folder(form) => write_folder(args, form, console),
         Kind::Mesh(format) => write_mesh(args, format, console),
         Kind::Points => write_points(args, console),
@@ -261,6 +272,7 @@ fn tell_of_folder(
         files: Some(files),
         loss,
         points: None,
+        slot: None,
     };
     let mut words = format!(
         "{} files of {} written to {}",
@@ -295,6 +307,7 @@ fn write_points(args: &ExportArgs, console: &Console) -> Result<Outcome, Error> 
             left_out: cloud.left_out,
             has_sigma: cloud.has_sigma,
         }),
+        slot: None,
     };
     let sigma = if cloud.has_sigma { ", with sigma" } else { "" };
     let words = format!(
@@ -334,6 +347,7 @@ fn write_file(args: &ExportArgs, start: &[u8], console: &Console) -> Result<Outc
         files: None,
         loss: None,
         points: None,
+        slot: None,
     };
     let place = match (args.blob.base_address, object.name) {
         (Some(first), _) => {
@@ -357,6 +371,33 @@ fn write_file(args: &ExportArgs, start: &[u8], console: &Console) -> Result<Outc
     Ok(Outcome::Done)
 }
 
+/// What a slot's image was written as.
+pub(super) fn tell_of_slot(
+    args: &ExportArgs,
+    blob_bytes: usize,
+    file: &[u8],
+    base_address: u32,
+    slot: &SlotObject,
+    words: &str,
+    console: &Console,
+) {
+    let object = ExportObject {
+        schema: SCHEMA,
+        output: &args.output,
+        format: args.format.name(),
+        blob_bytes: Some(blob_bytes),
+        file_bytes: file.len(),
+        base_address: Some(base_address),
+        family: args.blob.family.map(|family| family.0),
+        name: None,
+        files: None,
+        loss: None,
+        points: None,
+        slot: Some(slot),
+    };
+    console.result(words, &object);
+}
+
 /// Refuses what the form has no place for.
 fn check_options(args: &ExportArgs) -> Result<(), ExportError> {
     let form = args.format.name();
@@ -364,11 +405,14 @@ fn check_options(args: &ExportArgs) -> Result<(), ExportError> {
     let is_mesh = matches!(kind, Kind::Mesh(_));
     let folder_form = match kind {
         Kind::Folder(form) => Some(form),
-        Kind::File(_) | Kind::Mesh(_) | Kind::Points => None,
+        Kind::File(_) | Kind::Slot | Kind::Mesh(_) | Kind::Points => None,
     };
     let of_meshes = args.mesh.given().into_iter();
     let mut of_meshes = of_meshes.filter(|(_, is_given)| *is_given && !is_mesh);
-    let needless = args.blob.needless(args.format);
+    let is_slot = args.format == FormatArg::SlotImage;
+    let is_uf2 = args.format == FormatArg::Uf2 || (is_slot && args.slot.is_uf2());
+    let needless = args.blob.needless(args.format, is_uf2);
+    let needless = needless.or_else(|| args.slot.given().filter(|_| !is_slot));
     let needless = needless.or_else(|| of_meshes.next().map(|(option, _)| option));
     match needless.or_else(|| args.folder.needless(folder_form, is_mesh)) {
         Some(option) => Err(ExportError::NeedlessOption { form, option }),

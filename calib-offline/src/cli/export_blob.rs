@@ -34,9 +34,8 @@ pub struct BlobArgs {
 
 impl BlobArgs {
     /// The first option that is given and that the form has no place for.
-    pub(super) fn needless(&self, format: FormatArg) -> Option<&'static str> {
-        let is_uf2 = format == FormatArg::Uf2;
-        let is_placed = is_uf2 || format == FormatArg::Hex;
+    pub(super) fn needless(&self, format: FormatArg, is_uf2: bool) -> Option<&'static str> {
+        let is_placed = matches!(format, FormatArg::Uf2 | FormatArg::Hex);
         let options = [
             ("--base-address", self.base_address.is_some() && !is_placed),
             ("--family", self.family.is_some() && !is_uf2),

@@ -5,6 +5,7 @@ Example:
   calib-offline export rig.rays -o rig.hex --format hex --base-address 0x08100000
   calib-offline export rig.rays -o rig.uf2 --format uf2 --base-address 0x10100000 --family rp2040
   calib-offline export rig.rays -o rig.c --format c --name rig_blob
+  calib-offline export rig.rays -o slot.hex --format slot-image --part stm32h743 --region-address 0x08120000 --region-size 0xe0000 --serial SN-0012
   calib-offline export calibration.json -o opencv --format opencv
   calib-offline export calibration.json -o fisheye --format kalibr --model equidistant --distance-mm 800
   calib-offline export calibration.json -o flat --format undistort --images recordings/monday
@@ -19,6 +20,13 @@ sectors and leave files without a family alone: there it is a multiple of 4096, 
 Nordic's nrf-intel-hex, refuse HEX from 0x80000000 on, where external flash of many parts is: take bin there, and give the tool the address.
 The C source defines an array, aligned to 8, and its length NAME_len (ray-runtime/c/rays.h opens it). docs/FLASHING.md has
 the commands of flash tools. An earlier file of the same form is replaced; any other only with --force.
+
+slot-image is what a production line writes, so that a device with the storage of ray-device starts with the blob: its
+slot with a sealed commit record, made by the device's own code for the unit, block and erased value of --part (or --unit, --block,
+--erased). They, --region-address and --region-size are those that the device's firmware hands to the storage; the rest of that
+region has to be blank. With --serial a factory record says that the device has the blob's cameras. --container hex holds only
+what is programmed, which parts with ECC need; bin and uf2 (with --family) hold the blank bytes between, too. A device whose flash
+driver has another unit says that the slot is for another part (code 128).
 
 The others take a blob or a calibration.json and write a folder; files in it are replaced only with --force.
 opencv  NAME.yml a camera and extrinsics.yml (R, T: the second camera from the first, mm)
@@ -63,4 +71,6 @@ With --json, schema calib-offline/export/1:
     held_back_nodes lay beyond the format's integers. FOLDER.loss.json of lenses has maps too
     (camera, rotation, translation_mm, u_px, v_px, du_px, dv_px, mm)    rig from lens; by row and
     column, null where there is no ray
-  points (count, left_out, has_sigma)    of ply; else null";
+  points (count, left_out, has_sigma)    of ply; else null
+  slot (container, slot, unit, block, erased, region_address, region_size, blob_address, programmed_bytes,
+    has_factory_record)    of slot-image, whose base_address is that of the first byte; else null";

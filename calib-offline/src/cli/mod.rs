@@ -24,6 +24,7 @@ mod export_help;
 mod export_loss;
 mod export_mesh;
 mod export_options;
+mod export_slot;
 mod failure;
 pub mod flash;
 pub mod foreign_args;

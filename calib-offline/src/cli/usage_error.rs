@@ -3,6 +3,7 @@
 use crate::pipeline::NoSuchPose;
 use calib_judge::TaskWordsError;
 use calib_rays::remedy::Remedy;
+use firmware_sim::slot_image::SlotImageError;
 use std::path::PathBuf;
 
 /// A request that cannot be met.
@@ -23,6 +24,15 @@ pub enum UsageError {
         /// What it could have been.
         expected: &'static str,
     },
+    /// The image of a slot cannot be made without this.
+    #[error("slot-image needs {option}")]
+    SlotImageLacks {
+        /// What to give.
+        option: &'static str,
+    },
+    /// There is no such image.
+    #[error(transparent)]
+    SlotImage(SlotImageError),
     /// A kind of target that is not printed.
     #[error("kind = \"{kind}\" has no print of its own")]
     NothingToPrint {
@@ -162,6 +172,10 @@ impl Remedy for UsageError {
         let text = match self {
             Self::Exists { .. } => "choose another place, or replace it with --force",
             Self::UnknownKind { .. } | Self::NotFound { .. } => "check the path",
+            Self::SlotImageLacks { .. } => {
+                "give what the device's firmware hands to the storage: its flash driver's unit and block, and the start and length of its region"
+            }
+            Self::SlotImage(error) => return slot_image_remedy(error),
             Self::NothingToPrint { .. } => {
                 "choose chessboard, charuco, aprilgrid, circles or rings"
             }
@@ -203,4 +217,20 @@ impl Remedy for UsageError {
         };
         Some(text.to_owned())
     }
+}
+
+fn slot_image_remedy(error: &SlotImageError) -> Option<String> {
+    let text = match error {
+        SlotImageError::Unsupported(_) => "give --unit and --block as the part's flash driver says",
+        SlotImageError::NotBlocks { .. } | SlotImageError::TooShort { .. } => {
+            "give the --region-address and --region-size that the firmware hands to the storage"
+        }
+        SlotImageError::NoSuchSlot(_) => "give --slot 0 or --slot 1",
+        SlotImageError::TooLong { .. } => {
+            "pack it with a larger error bound, or give the storage a larger region"
+        }
+        SlotImageError::NoRecord => "give a shorter --serial, or leave it out",
+        _ => return None,
+    };
+    Some(text.to_owned())
 }

@@ -25,6 +25,13 @@ const HEX: [&str; 8] = [
     "0x08100000",
 ];
 
+const REGION: [&str; 5] = [
+    "rig.rays",
+    "--format",
+    "slot-image",
+    "--region-size",
+    "0x10000",
+];
 const RP2040: [&str; 5] = ["rig.rays", "--format", "uf2", "--family", "rp2040"];
 
 #[test]
@@ -110,6 +117,72 @@ fn json_says_what_was_written() {
     assert!(object["family"].is_null() && object["name"].is_null());
 }
 
+const SLOT: [&str; 12] = [
+    "export",
+    "rig.rays",
+    "--format",
+    "slot-image",
+    "--part",
+    "stm32h743",
+    "--region-address",
+    "0x08120000",
+    "--region-size",
+    "0xe0000",
+    "-o",
+    "slot.out",
+];
+
+/// Whether a device starts with it is tested beside the simulated device, for every part.
+#[test]
+fn an_image_of_a_slot_is_written_in_every_container() {
+    let (folder, blob) = folder();
+    let path = folder.path();
+    let written = |more: &[&str]| {
+        let run = run(path, &[&SLOT[..], more, &["--force", "--json"]].concat());
+        run.assert_code(0);
+        (fs::read(path.join("slot.out")).unwrap(), run.json())
+    };
+    let (bin, object) = written(&["--container", "bin"]);
+    // Behind the factory's block, a log in a quarter of the first block, then the blob.
+    assert_eq!(object["base_address"], 0x0814_0000);
+    assert_eq!(object["slot"]["blob_address"], 0x0814_8000);
+    assert_eq!(bin[0x8000..][..blob.len()], blob);
+    assert!(bin.starts_with(b"RayD"));
+    let (hex, object) = written(&["--slot", "1"]);
+    assert!(hex.starts_with(b":02000004081AD8\n:10000000526179"));
+    assert_eq!(object["slot"]["container"], "hex");
+    assert!(hex.len() < 4 * blob.len());
+    let by_hand = [
+        "export",
+        "rig.rays",
+        "--format",
+        "slot-image",
+        "--unit",
+        "1",
+        "--block",
+        "4096",
+        "--region-address",
+        "0x10100000",
+        "--region-size",
+        "0x10000",
+        "--container",
+        "uf2",
+        "--family",
+        "rp2040",
+        "--serial",
+        "SN-0012",
+        "-o",
+        "slot.uf2",
+    ];
+    let by_hand = run(path, &by_hand);
+    by_hand.assert_code(0).assert_says(&[]);
+    let uf2 = fs::read(path.join("slot.uf2")).unwrap();
+    // Factory block, log, blob.
+    assert_eq!(uf2.len(), 3 * 16 * 512);
+    assert_eq!(uf2[32..36], *b"RigF");
+    assert_eq!(uf2[32 * 512 + 32..][..256], blob[..256]);
+}
+
 #[test]
 fn what_a_reader_of_the_file_should_know_is_said() {
     let (folder, _) = folder();
@@ -139,7 +212,7 @@ fn wrong_requests_write_nothing() {
     fs::write(path.join("text.rays"), "left,right\n").unwrap();
     fs::write(path.join("calibration.json"), "{}").unwrap();
     let before = contents(path);
-    let cases: [(&[&str], &[&str]); 19] = [
+    let cases: [(&[&str], &[&str]); 24] = [
         (&["damaged.rays", "--format", "bin"], &["damaged", "try: "]),
         (&["short.rays", "--format", "bin"], &["cut off", "try: "]),
         (&["text.rays", "--format", "bin"], &["text.rays: is not"]),
@@ -205,6 +278,26 @@ fn wrong_requests_write_nothing() {
         (
             &["rig.rays", "--format", "hex", "--base-address", "flash"],
             &["0x10100000"],
+        ),
+        (
+            &["rig.rays", "--format", "slot-image", "--part", "stm32h743"],
+            &["slot-image needs --region-address", "firmware"],
+        ),
+        (
+            &[&REGION[..], &["--region-address", "0"]].concat(),
+            &["slot-image needs --part, or --unit and --block"],
+        ),
+        (
+            &[&REGION[..], &["--region-address", "4", "--part", "rp2040"]].concat(),
+            &["not made of blocks of 4096"],
+        ),
+        (
+            &[&REGION[..], &["--region-address", "0", "--part", "stm33"]].concat(),
+            &["stm33", "stm32h743", "--unit"],
+        ),
+        (
+            &["rig.rays", "--format", "bin", "--part", "rp2040"],
+            &["bin has no place for --part"],
         ),
         (
             &["rig.rays", "--format", "bin", "--name", "rig"],

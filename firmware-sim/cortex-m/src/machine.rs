@@ -4,17 +4,20 @@
 //! registers and flash at fixed addresses, views of the flash that the board maps into memory, and
 //! switching an interrupt on. Each stands in a function of its own, with the reason why it is sound.
 //!
-//! The board is Arm's MPS2 with the AN386 image (Arm DAI 0386): CMSDK UART 0 at 0x40004000, dual
+//! The board of the device is Arm's MPS2 with the AN386 image (Arm DAI 0386): CMSDK UART 0 at 0x40004000, dual
 //! timer at 0x40002000, both clocked with 25 MHz; 16 MiB of PSRAM at 0x21000000, which here stand
-//! for memory-mapped NOR flash. QEMU emulates all of them.
+//! for memory-mapped NOR flash. QEMU emulates all of them. Images that only count and compare use nothing of a board but its
+//! memory, and SysTick, which QEMU gives every core: they run on those of `memory/*.x`.
 #![allow(unsafe_code)]
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use cortex_m::interrupt::InterruptNumber;
 use cortex_m::peripheral::NVIC;
+#[cfg(target_abi = "eabihf")]
+use cortex_m::register::fpscr::Fpscr;
 
-/// Start of the emulated flash.
+/// Start of the device's emulated flash.
 pub const FLASH_START: usize = 0x2100_0000;
 
 /// Its length, bytes.
@@ -22,8 +25,9 @@ pub const FLASH_LENGTH: usize = 16 << 20;
 
 const UART0: usize = 0x4000_4000;
 const DUAL_TIMER: usize = 0x4000_2000;
+const SYST: usize = 0xe000_e010;
 
-/// The registers used here, each valid and word-aligned on this board.
+/// The registers used here, each valid and word-aligned on the boards whose images use it.
 #[derive(Clone, Copy)]
 #[repr(usize)]
 enum Register {
@@ -35,6 +39,9 @@ enum Register {
     TimerLoad = DUAL_TIMER,
     TimerValue = DUAL_TIMER + 0x04,
     TimerControl = DUAL_TIMER + 0x08,
+    SysTickControl = SYST,
+    SysTickReload = SYST + 0x04,
+    SysTickValue = SYST + 0x08,
 }
 
 const STATE_TRANSMIT_FULL: u32 = 1 << 0;
@@ -46,6 +53,10 @@ const INTERRUPT_RECEIVE: u32 = 1 << 1;
 const TIMER_ENABLE: u32 = 1 << 7;
 const TIMER_PRESCALE_256: u32 = 0b10 << 2;
 const TIMER_32_BIT: u32 = 1 << 1;
+const SYSTICK_ENABLE: u32 = 1 << 0;
+const SYSTICK_PROCESSOR_CLOCK: u32 = 1 << 2;
+const SYSTICK_HAS_COUNTED_TO_ZERO: u32 = 1 << 16;
+const SYSTICK_MOST: u32 = 0x00ff_ffff;
 
 /// Timer ticks in 32 ms: 25 MHz / 256 are 97,656.25 ticks a second.
 pub const TIMER_TICKS_IN_32_MS: u32 = 3125;
@@ -134,13 +145,43 @@ pub fn timer_ticks() -> u32 {
     !read(Register::TimerValue)
 }
 
-/// The emulated flash, for an image that only reads it: one that calls [`flash_to_write`] must not
-/// call this.
+/// Starts SysTick, to count instructions on any core.
+pub fn stopwatch_start() {
+    write(Register::SysTickReload, SYSTICK_MOST);
+    write(
+        Register::SysTickControl,
+        SYSTICK_ENABLE | SYSTICK_PROCESSOR_CLOCK,
+    );
+}
+
+/// Sets it to its start.
+pub fn stopwatch_restart() {
+    write(Register::SysTickValue, 0);
+    // It goes to its start at the next tick. Reading the control register clears what it says of the last round.
+    while read(Register::SysTickValue) == 0 {}
+    let _ = read(Register::SysTickControl);
+}
+
+/// Its ticks, counted upwards in 24 bits.
+pub fn stopwatch_ticks() -> u32 {
+    SYSTICK_MOST - read(Register::SysTickValue)
+}
+
+/// Whether it has gone round since it was set to its start.
+pub fn stopwatch_has_wrapped() -> bool {
+    read(Register::SysTickControl) & SYSTICK_HAS_COUNTED_TO_ZERO != 0
+}
+
+/// What QEMU has loaded behind the program, for an image that only reads it.
 pub fn flash() -> &'static [u8] {
-    // SAFETY: the board has 16 MiB of plain memory here, outside of what `memory.x` gives to the
-    // program, so no other Rust object overlaps; nothing writes there while the image runs, and any
-    // bytes are valid `u8`.
-    unsafe { core::slice::from_raw_parts(FLASH_START as *const u8, FLASH_LENGTH) }
+    unsafe extern "C" {
+        static _stored_start: u8;
+        static _stored_end: u8;
+    }
+    let [start, end] = [&raw const _stored_start, &raw const _stored_end];
+    // SAFETY: between these two symbols of `memory/*.x` the board has plain memory, outside of what the map gives to the
+    // program, so no other Rust object overlaps; nothing writes there while the image runs, and any bytes are valid `u8`.
+    unsafe { core::slice::from_raw_parts(start, end.addr().wrapping_sub(start.addr())) }
 }
 
 /// The emulated flash, for the image that writes it; `None` from the second call on. Whoever takes it
@@ -156,8 +197,8 @@ pub fn flash_to_write() -> Option<&'static mut [u8]> {
     if was_taken {
         return None;
     }
-    // SAFETY: as for `flash`, and nobody else has a reference to it: this one is handed out once,
-    // and the image that takes it calls `flash` nowhere.
+    // SAFETY: the board has 16 MiB of plain memory here, outside of what its map gives to the program, so no other Rust
+    // object overlaps, and any bytes are valid `u8`. Nobody else has a reference to it: this one is handed out once.
     Some(unsafe { core::slice::from_raw_parts_mut(FLASH_START as *mut u8, FLASH_LENGTH) })
 }
 
@@ -196,6 +237,17 @@ pub fn refuse_to_link() -> ! {
     unsafe { a_panic_is_reachable_in_this_image() }
 }
 
+/// Sets the mode that the floating-point unit computes in.
+///
+/// Rust takes it for granted that numbers are rounded to nearest, so code that runs in another mode may do
+/// anything with numbers. It is for the image that shows what the runtime does then.
+#[cfg(target_abi = "eabihf")]
+pub fn set_float_mode(mode: Fpscr) {
+    // SAFETY: a status and control register: writing it touches no memory. That numbers come out otherwise is what
+    // it is for.
+    unsafe { cortex_m::register::fpscr::write(mode) }
+}
+
 /// A hundred instructions and no other.
 #[inline(always)]
 pub fn hundred_nops() {
@@ -221,8 +273,8 @@ fn stack_pointer() -> usize {
     pointer
 }
 
-/// What the stack below is painted with, and how much of it, bytes. The stack has the 4 MiB of RAM
-/// to itself but for the few bytes of statics at their other end.
+/// What the stack below is painted with, and how much of it at most, bytes. The stack has the RAM
+/// to itself but for the few bytes of statics at its other end.
 const PAINT: u32 = 0x5ca1_ab1e;
 const PAINTED_BYTES: usize = 16 << 10;
 
@@ -230,8 +282,14 @@ const PAINTED_BYTES: usize = 16 << 10;
 /// that it changed; and what it returned. At most 16 KiB are seen.
 #[inline(never)]
 pub fn stack_bytes_of<T, R>(work: fn(&T) -> R, on: &T) -> (u32, R) {
+    unsafe extern "C" {
+        /// Where `cortex-m-rt` says that the statics end.
+        static __sheap: u32;
+    }
     let end = stack_pointer();
-    let start = end - PAINTED_BYTES;
+    let start = (&raw const __sheap)
+        .addr()
+        .max(end.saturating_sub(PAINTED_BYTES));
     for address in (start..end).step_by(4) {
         // SAFETY: the words below the stack pointer are RAM that belongs to nobody: this
         // function has its whole frame above, calls nothing meanwhile, and interrupts are masked.

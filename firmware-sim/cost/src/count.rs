@@ -4,7 +4,8 @@ use std::io::Write;
 use std::path::Path;
 
 use crate::blobs::{Asked, MATCH_COUNT};
-use crate::counting::{KNOWN_INSTRUCTIONS, Probe, RECORD_LEN, ROW_LEN, Record};
+use crate::cores::Core;
+use crate::counting::{KNOWN_INSTRUCTIONS, Probe, RECORD_LEN, ROW_LEN, Record, WRAPPED};
 use crate::error::CostError;
 use crate::image::Image;
 use crate::images::Images;
@@ -12,11 +13,11 @@ use crate::report::{BlobCost, Conditions, Row, Spread};
 
 /// Name of the image.
 pub const COUNTING: &str = "counting";
+/// Where the functions are that do the work.
+const PROBES: &str = "firmware_cost::probes";
 
-/// An instruction takes 2^10 ns of QEMU's time, the most that it can be set to.
-pub const TIME_SHIFT: u32 = 10;
-/// A tick of the board's timer, ns.
-const TICK_NS: u64 = 40;
+/// An instruction takes 2^8 ns of QEMU's time: some ticks of every counter, whose 24 bits go round after two million.
+pub const TIME_SHIFT: u32 = 8;
 
 /// Counts the work on one blob; what was found out about the counting itself goes into
 /// `conditions`.
@@ -25,18 +26,25 @@ const TICK_NS: u64 = 40;
 /// [`CostError`].
 pub fn cost_of_blob(
     images: &impl Images,
+    core: &Core,
     image: &Image,
     path: &Path,
     asked: &Asked,
     conditions: &mut Conditions,
 ) -> Result<BlobCost, CostError> {
-    let records = run(images, path, asked)?;
+    let records = run(images, core, path, asked)?;
+    if records.iter().any(|record| record.ticks == WRAPPED) {
+        return Err(CostError::TooLong {
+            path: path.to_owned(),
+        });
+    }
+    let instructions = |record: &Record| instructions(record, core);
     let of = |probe: Probe| {
         records
             .iter()
             .filter(move |record| record.probe == probe as u32)
     };
-    let first_count = |probe| of(probe).next().map_or(0, instructions);
+    let first_count = |probe| of(probe).next().map_or(0, &instructions);
     let overhead = first_count(Probe::Nothing);
     let known = first_count(Probe::Known) - overhead;
     if known != i64::from(KNOWN_INSTRUCTIONS) {
@@ -70,7 +78,11 @@ pub fn cost_of_blob(
                 failed,
             });
         }
-        let Some(spread) = Spread::of(answered.iter().map(|record| work.each(instructions(record) - overhead))) else {
+        let Some(spread) = Spread::of(
+            answered
+                .iter()
+                .map(|record| work.each(instructions(record) - overhead)),
+        ) else {
             continue;
         };
         let camera = work.camera.and_then(|k| asked.cameras.get(k));
@@ -80,7 +92,7 @@ pub fn cost_of_blob(
             is_yardstick: work.is_yardstick,
             runs: answered.len(),
             instructions: spread,
-            stack_bound: image.stack_bound(COUNTING, work.function),
+            stack_bound: image.stack_bound(PROBES, work.function),
             stack_bytes: answered.iter().map(|r| r.stack_bytes).max().unwrap_or(0),
         });
     }
@@ -97,14 +109,20 @@ pub fn cost_of_blob(
 }
 
 /// Runs the counting image on a blob.
-fn run(images: &impl Images, path: &Path, asked: &Asked) -> Result<Vec<Record>, CostError> {
+fn run(
+    images: &impl Images,
+    core: &Core,
+    path: &Path,
+    asked: &Asked,
+) -> Result<Vec<Record>, CostError> {
     let io = |source| CostError::Io {
         what: "a temporary file for the flash".into(),
         source,
     };
     let mut flash = tempfile::NamedTempFile::new().map_err(io)?;
     flash.write_all(&asked.flash).map_err(io)?;
-    let output = images.run_counting(&images.path(COUNTING), flash.path(), TIME_SHIFT)?;
+    let output =
+        images.run_counting(core, &images.path(core, COUNTING), flash.path(), TIME_SHIFT)?;
     if !output.status.success() {
         return Err(CostError::Failed {
             path: path.to_owned(),
@@ -126,10 +144,11 @@ fn run(images: &impl Images, path: &Path, asked: &Asked) -> Result<Vec<Record>, 
     Ok(records.iter().map(Record::from_bytes).collect())
 }
 
-/// Ticks are whole, so their number is off by less than one, and an instruction is 25.6 of them.
-fn instructions(record: &Record) -> i64 {
-    let ns = u64::from(record.ticks) * TICK_NS;
-    ((ns + (1 << (TIME_SHIFT - 1))) >> TIME_SHIFT) as i64
+/// Ticks are whole, so their number is off by less than one, and an instruction is two of them at least.
+fn instructions(record: &Record, core: &Core) -> i64 {
+    let instruction_ps = 1000 << TIME_SHIFT;
+    let ps = u64::from(record.ticks) * core.tick_ps;
+    ((ps + instruction_ps / 2) / instruction_ps) as i64
 }
 
 impl Spread {
@@ -148,7 +167,7 @@ struct Work {
     probe: Probe,
     /// What the report calls it.
     name: &'static str,
-    /// The function of the counting image that does it.
+    /// The function of `probes` that does it.
     function: &'static str,
     /// Which of the two, for work on one.
     camera: Option<usize>,

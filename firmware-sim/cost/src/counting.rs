@@ -5,7 +5,7 @@
 //! [`Probe`] on every match of the job and writes a [`Record`] for each run to its standard output.
 //!
 //! A new row of the table is a new [`Probe`] here, a function that does it in
-//! `cortex-m/src/bin/counting.rs`, and a line in `WORK` of `count.rs`.
+//! `probes.rs`, and a line in `WORK` of `count.rs`.
 
 use ray_runtime::PixelPoint;
 
@@ -88,11 +88,14 @@ pub struct Record {
     pub match_idx: u32,
     /// Whether the work came to a result: 1, or 0 for an error.
     pub answered: u32,
-    /// Ticks of the timer between the two looks at it.
+    /// Ticks of the counter between the two looks at it, or [`WRAPPED`].
     pub ticks: u32,
     /// Bytes of stack below the caller's frame.
     pub stack_bytes: u32,
 }
+
+/// In place of ticks: the counter has gone round.
+pub const WRAPPED: u32 = u32::MAX;
 
 /// Length of a [`Record`], bytes.
 pub const RECORD_LEN: usize = 20;

@@ -74,6 +74,12 @@ pub enum CostError {
         /// What came out.
         counted: i64,
     },
+    /// Some work takes more instructions than the counter holds.
+    #[error("{}: some of its work takes more instructions than can be counted, some two millions", path.display())]
+    TooLong {
+        /// The blob.
+        path: PathBuf,
+    },
     /// The runtime gave no result where it gave one on this computer.
     #[error("{}: `{what}` came to no result in {failed} runs", path.display())]
     NoResult {

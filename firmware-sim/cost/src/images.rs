@@ -4,27 +4,29 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
+use crate::cores::Core;
+
 /// Why there is no image, or why it did not run.
 pub type ImagesError = Box<dyn Error + Send + Sync>;
 
-/// Builds the images of `cortex-m` and runs them in QEMU.
+/// Builds the images of `cortex-m` and `riscv` and runs them in QEMU.
 pub trait Images {
-    /// What QEMU says of its version.
+    /// What QEMU for this core says of its version.
     ///
     /// # Errors
     /// If it is not installed.
-    fn qemu_version(&self) -> Result<String, ImagesError>;
+    fn qemu_version(&self, core: &Core) -> Result<String, ImagesError>;
 
-    /// Builds the images of these names if they are missing or stale.
+    /// Builds the images of these names for a core if they are missing or stale.
     ///
     /// # Errors
     /// If that fails, or there is nothing to build them with.
-    fn build(&self, names: &[&str]) -> Result<(), ImagesError>;
+    fn build(&self, core: &Core, names: &[&str]) -> Result<(), ImagesError>;
 
     /// Where the image of this name is once it has been built.
-    fn path(&self, name: &str) -> PathBuf;
+    fn path(&self, core: &Core, name: &str) -> PathBuf;
 
-    /// Builds the image of this name without what reads blobs of old versions, and returns where it is.
+    /// Builds the device's image of this name without what reads blobs of old versions, and returns where it is.
     ///
     /// # Errors
     /// As [`Images::build`].
@@ -37,6 +39,7 @@ pub trait Images {
     /// If it cannot be run.
     fn run_counting(
         &self,
+        core: &Core,
         image: &Path,
         flash: &Path,
         time_shift: u32,

@@ -2,11 +2,16 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 
 pub mod counting;
+pub mod probes;
 pub mod same_bits;
 pub mod yardstick;
 
 #[cfg(feature = "std")]
+mod across;
+#[cfg(feature = "std")]
 mod blobs;
+#[cfg(feature = "std")]
+mod cores;
 #[cfg(feature = "std")]
 mod count;
 #[cfg(feature = "std")]
@@ -25,7 +30,11 @@ mod stack;
 mod text;
 
 #[cfg(feature = "std")]
+pub use across::{AcrossCores, CoreCost, across, usual};
+#[cfg(feature = "std")]
 pub use blobs::built_in;
+#[cfg(feature = "std")]
+pub use cores::{CORES, CORTEX_M4F, Core};
 #[cfg(feature = "std")]
 pub use error::CostError;
 #[cfg(feature = "std")]

@@ -1,7 +1,7 @@
 //! What the runtime costs on a Cortex-M4F: instructions and stack from QEMU, code from the images.
 //!
-//! The image `counting` runs every piece of work between two looks at a timer. QEMU gives each
-//! instruction the same time and everything else none, so the timer counts instructions: exactly,
+//! The image `counting` runs every piece of work between two looks at a counter. QEMU gives each
+//! instruction the same time and everything else none, so it counts instructions: exactly,
 //! and the same in every run. What the two looks and an empty call take is subtracted; a block of a
 //! hundred instructions must then count a hundred, or nothing is reported.
 
@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::blobs::Asked;
+use crate::cores::{CORTEX_M4F, Core};
 use crate::count::{COUNTING, cost_of_blob};
 use crate::counting::KNOWN_INSTRUCTIONS;
 use crate::error::CostError;
@@ -41,30 +42,23 @@ const IMAGES: [(&str, &str, &[&str]); 3] = [
 /// # Errors
 /// [`CostError`].
 pub fn measure(images: &impl Images, paths: &[PathBuf]) -> Result<Cost, CostError> {
-    let qemu = images.qemu_version()?;
+    let core = &CORTEX_M4F;
+    let qemu = images.qemu_version(core)?;
     let asked = paths
         .iter()
         .map(|path| Asked::read(path))
         .collect::<Result<Vec<_>, _>>()?;
     let mut names = vec![COUNTING];
     names.extend(IMAGES.map(|(name, ..)| name));
-    images.build(&names)?;
+    images.build(core, &names)?;
 
-    let counting = Image::read(&images.path(COUNTING))?;
-    let mut conditions = Conditions {
-        target: "thumbv7em-none-eabihf",
-        machine: "mps2-an386, cortex-m4",
-        qemu,
-        compiler: counting.compiler.clone().unwrap_or_default(),
-        profile: "opt-level 3, fat LTO, one codegen unit, panic = abort",
-        known_block: KNOWN_INSTRUCTIONS,
-        known_block_counted: 0,
-        overhead: 0,
-    };
+    let counting = Image::read(&images.path(core, COUNTING))?;
+    let mut conditions = conditions(core, qemu, &counting);
     let mut blobs = Vec::new();
     for (path, asked) in paths.iter().zip(&asked) {
         blobs.push(cost_of_blob(
             images,
+            core,
             &counting,
             path,
             asked,
@@ -74,7 +68,7 @@ pub fn measure(images: &impl Images, paths: &[PathBuf]) -> Result<Cost, CostErro
     let newest_only = Image::read(&images.build_newest_only(IMAGES[0].0)?)?;
     let costs = IMAGES
         .iter()
-        .map(|(name, does, functions)| image_cost(&images.path(name), name, does, functions))
+        .map(|(name, does, functions)| image_cost(&images.path(core, name), name, does, functions))
         .collect::<Result<_, _>>()?;
     Ok(Cost {
         schema: SCHEMA,
@@ -83,6 +77,20 @@ pub fn measure(images: &impl Images, paths: &[PathBuf]) -> Result<Cost, CostErro
         images: costs,
         newest_only_code_bytes: runtime_code_bytes(&newest_only.code_by_origin()),
     })
+}
+
+/// What an image is counted with, before anything is.
+pub(crate) fn conditions(core: &Core, qemu: String, image: &Image) -> Conditions {
+    Conditions {
+        target: core.target,
+        machine: format!("{}, {}", core.machine, core.cpu),
+        qemu,
+        compiler: image.compiler.clone().unwrap_or_default(),
+        profile: "opt-level 3, fat LTO, one codegen unit, panic = abort",
+        known_block: KNOWN_INSTRUCTIONS,
+        known_block_counted: 0,
+        overhead: 0,
+    }
 }
 
 /// The functions of an image that have to do with panics: none, if it links only without.

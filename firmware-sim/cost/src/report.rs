@@ -27,8 +27,8 @@ pub struct Cost {
 pub struct Conditions {
     /// The target that the images are compiled for.
     pub target: &'static str,
-    /// The board.
-    pub machine: &'static str,
+    /// The board and its core.
+    pub machine: String,
     /// QEMU's own line.
     pub qemu: String,
     /// The compiler's own line, as it stands in the image.

@@ -6,6 +6,9 @@ use ray_runtime::integer::Rig;
 use ray_runtime::{Camera, Measurement, PixelPoint, RayBlob};
 use split_mix::SplitMix;
 
+/// How many matches a blob is asked in each mode of the floating-point unit.
+pub const FLOAT_MODE_MATCHES: u32 = 10_000;
+
 /// A checksum of the answers to `count` matches of the first two cameras of a blob: point, gap and
 /// standard deviations, or the code of why there is no point; and of the pixels that some points are
 /// projected to. `None` if there are not two cameras.

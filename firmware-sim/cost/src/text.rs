@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
+use crate::across::{AcrossCores, means};
 use crate::count::TIME_SHIFT;
 use crate::image::STARTUP;
 use crate::report::{BlobCost, Cost, ImageCost, StackBound};
@@ -88,8 +89,8 @@ impl Cost {
         text
     }
 
-    /// `ray-runtime/COST.md`.
-    pub fn to_markdown(&self) -> String {
+    /// `ray-runtime/COST.md`, with other cores in it.
+    pub fn to_markdown(&self, across: &AcrossCores) -> String {
         let conditions = &self.conditions;
         let mut text = String::from(include_str!("method.md"));
         let _ = write!(
@@ -109,6 +110,9 @@ impl Cost {
             conditions.overhead,
         );
         self.tables(&mut text, Style::Markdown);
+        text.push_str(include_str!("choose.md"));
+        text.push('\n');
+        across.tables(&mut text, Style::Markdown);
         while text.ends_with("\n\n") {
             text.pop();
         }
@@ -144,6 +148,64 @@ impl Cost {
         let _ = writeln!(text, "{}", bounds(&self.images).drawn(style));
     }
 }
+
+impl AcrossCores {
+    /// A table for each blob, for a terminal.
+    pub fn to_text(&self) -> String {
+        let mut text = String::new();
+        self.tables(&mut text, Style::Plain);
+        text.push_str("Instructions, the mean of all pixels; they are not cycles.\n");
+        text
+    }
+
+    fn tables(&self, text: &mut String, style: Style) {
+        let mut conditions = Table::new(&["core", "compiled for", "run by QEMU as"]);
+        for core in &self.cores {
+            let flags = core.flags.trim_start_matches("-C ");
+            conditions.rows.push(vec![
+                core.core.to_owned(),
+                format!("{} {flags}", core.conditions.target)
+                    .trim_end()
+                    .to_owned(),
+                core.conditions.machine.clone(),
+            ]);
+        }
+        heading(text, style, "The cores");
+        let _ = writeln!(text, "{}", conditions.drawn(style));
+        let Some(first) = self.cores.first() else {
+            return;
+        };
+        for (number, blob) in first.blobs.iter().enumerate() {
+            heading(text, style, &heading_of(blob));
+            let mut table = Table::new(&ACROSS.map(|(_, head)| head));
+            for core in &self.cores {
+                let Some(blob) = core.blobs.get(number) else {
+                    continue;
+                };
+                let means = means(blob);
+                let cell = |(work, _): (&str, &str)| match work {
+                    "" => core.core.to_owned(),
+                    work => means
+                        .get(work)
+                        .map_or("-".to_owned(), |mean| format!("{mean:.0}")),
+                };
+                table.rows.push(ACROSS.map(cell).to_vec());
+            }
+            let _ = writeln!(text, "{}", table.drawn(style));
+        }
+    }
+}
+
+/// The columns of the tables across cores: the work, and what stands above it.
+const ACROSS: [(&str, &str); 7] = [
+    ("", "instructions"),
+    ("lookup", "lookup"),
+    ("a ray in a row of 64", "a ray in a row of 64"),
+    ("triangulate", "triangulate"),
+    ("triangulate_with_covariance", "with covariance"),
+    ("open", "open"),
+    ("bilinear_triangulate", "yardstick: bilinear triangulate"),
+];
 
 fn heading(text: &mut String, style: Style, heading: &str) {
     let _ = match style {

@@ -173,7 +173,17 @@ pub struct Epoch<'e, S, C> {
     is_over: bool,
 }
 
-impl<S: SlotFlash, C: Clock> Epoch<'_, S, C> {
+impl<'e, S: SlotFlash, C: Clock> Epoch<'e, S, C> {
+    /// The blob in use, open, or why there is none: the stable code of the runtime's `OpenError`, or
+    /// [`OTHER_PART`](storage::OTHER_PART). It is a copy that borrows the slot and not the epoch, so that one task can
+    /// measure while another serves: see `examples`. Both end with the epoch.
+    ///
+    /// # Errors
+    /// That code.
+    pub const fn blob(&self) -> Result<RayBlob<'e>, u8> {
+        self.blob
+    }
+
     /// The answer to a request of this peer.
     pub fn respond_to(&mut self, peer: Peer, request: &Request) -> Reply {
         let reply = match request {

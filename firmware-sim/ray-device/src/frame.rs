@@ -32,7 +32,15 @@ pub const NO_SEQUENCE: u16 = 0;
 const HEAD_LENGTH: usize = 3;
 const CHECKSUM_LENGTH: usize = 4;
 /// One 1 KiB table on a device; sixteen, which take sixteen bytes at a time, where there is memory.
-type Tables = Table<{ if cfg!(target_os = "none") { 1 } else { 16 } }>;
+type Tables = Table<
+    {
+        if cfg!(feature = "wide-checksum") {
+            16
+        } else {
+            1
+        }
+    },
+>;
 static CHECKSUM: Crc<u32, Tables> = Crc::<u32, Tables>::new(&CRC_32_ISO_HDLC);
 
 /// CRC-32/ISO-HDLC (zlib's) of `bytes`: of frames, of blobs under way, of commit records.
@@ -120,7 +128,12 @@ impl FrameWriter {
 
         let encoded_length = cobs::encode(self.message.get(..length)?, &mut self.frame)?;
         *self.frame.get_mut(encoded_length)? = DELIMITER;
-        self.frame.get(..=encoded_length)
+        self.frame(encoded_length + 1)
+    }
+
+    /// The frame sealed last, whose length it was.
+    pub(crate) fn frame(&self, length: usize) -> Option<&[u8]> {
+        self.frame.get(..length)
     }
 }
 

@@ -75,7 +75,15 @@ impl Health {
 
     /// Counts a point.
     pub fn note(&mut self, measured: &Measurement) {
-        let gap_mm = measured.signed_gap_mm();
+        let predicted = measured.covariance.as_ref();
+        self.note_gap(
+            measured.signed_gap_mm(),
+            predicted.map_or(0.0, |covariance| covariance.gap_mm2),
+        );
+    }
+
+    /// Counts a gap with its sign, mm, and the variance that is predicted for it, mm^2: 0 where nothing is.
+    pub fn note_gap(&mut self, gap_mm: f32, variance_mm2: f32) {
         if !gap_mm.is_finite() {
             return;
         }
@@ -86,11 +94,7 @@ impl Health {
         self.signed_mm += gap_mm;
         self.size_mm += gap_mm.abs();
         self.sizes_mm.count(gap_mm.abs());
-        let Some(covariance) = &measured.covariance else {
-            return;
-        };
         // A blob that predicts no gap at all predicts nothing to compare with.
-        let variance_mm2 = covariance.gap_mm2;
         if variance_mm2 > 0.0 && variance_mm2.is_finite() {
             let sigma_mm = libm::sqrtf(variance_mm2);
             let ratio = gap_mm / sigma_mm;
@@ -142,6 +146,7 @@ impl Health {
 
 /// The gaps of what a device has measured.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GapReport {
     /// Points counted, older ones with less weight: see [`FORGET_AT`].
     pub points: u32,
@@ -158,6 +163,7 @@ pub struct GapReport {
 
 /// Gaps beside their predicted standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Predicted {
     /// Points with a prediction.
     pub points: u32,
@@ -173,6 +179,7 @@ pub struct Predicted {
 
 /// What a [`GapReport`] says of the calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Verdict {
     /// The blob says nothing of gaps.
     NothingPredicted,

@@ -6,6 +6,8 @@ pub mod app;
 pub mod cobs;
 pub mod frame;
 pub mod health;
+#[cfg(feature = "embedded-io")]
+pub mod io_link;
 pub mod port;
 pub mod protocol;
 pub mod session;

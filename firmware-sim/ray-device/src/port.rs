@@ -97,6 +97,7 @@ pub trait Link {
 
 /// What a flash is programmed and erased in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Geometry {
     /// Bytes that are programmed at once, each unit once between two erases: a power of two, at most
     /// [`Geometry::MAX_UNIT`].
@@ -164,24 +165,9 @@ pub trait Flash: NorFlash {
     ///
     /// # Errors
     /// If that cannot be told: the bytes then count as programmed.
-    #[inline(never)]
+    #[inline(always)]
     fn is_blank(&mut self, start: u32, length: u32) -> Result<bool, Self::Error> {
-        let erased = self.geometry().erased;
-        let end = start.saturating_add(length);
-        let mut at = start;
-        let mut piece = [0; 64];
-        while at < end {
-            let wanted = (end - at).min(piece.len() as u32);
-            let Some(piece) = piece.get_mut(..wanted as usize) else {
-                break;
-            };
-            self.read(at, piece)?;
-            if piece.iter().any(|&byte| byte != erased) {
-                return Ok(false);
-            }
-            at = at.saturating_add(wanted);
-        }
-        Ok(true)
+        reads_as_erased(self, start, length)
     }
 
     /// Where the region starts in the device's flash, for messages.
@@ -189,6 +175,34 @@ pub trait Flash: NorFlash {
     fn start(&self) -> u32 {
         0
     }
+}
+
+/// Whether these bytes read as erased: [`Flash::is_blank`] of a part whose blank words can be read.
+///
+/// # Errors
+/// If the driver cannot read them.
+#[inline(never)]
+pub fn reads_as_erased<R: Flash + ?Sized>(
+    flash: &mut R,
+    start: u32,
+    length: u32,
+) -> Result<bool, R::Error> {
+    let erased = flash.geometry().erased;
+    let end = start.saturating_add(length);
+    let mut at = start;
+    let mut piece = [0; 64];
+    while at < end {
+        let wanted = (end - at).min(piece.len() as u32);
+        let Some(piece) = piece.get_mut(..wanted as usize) else {
+            break;
+        };
+        flash.read(at, piece)?;
+        if piece.iter().any(|&byte| byte != erased) {
+            return Ok(false);
+        }
+        at = at.saturating_add(wanted);
+    }
+    Ok(true)
 }
 
 /// Flash that can also be read like memory.

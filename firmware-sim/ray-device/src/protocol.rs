@@ -42,6 +42,7 @@ pub type Name = String<MAX_NAME>;
 
 /// What a workstation asks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 // There is no heap to box the large variant into, and one request exists at a time.
 #[allow(clippy::large_enum_variant)]
 pub enum Request {
@@ -81,6 +82,7 @@ pub enum Request {
 
 /// What a device answers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[allow(clippy::large_enum_variant)]
 pub enum Reply {
     /// The request could not be carried out. Which blob is active did not change.
@@ -106,6 +108,7 @@ pub enum Reply {
 
 /// A blob to be sent.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NewBlob {
     /// Its length, bytes.
     pub length: u32,
@@ -122,6 +125,7 @@ pub struct NewBlob {
 
 /// An Ed25519 signature (RFC 8032) of all bytes of a blob.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Signature {
     /// Its first half, a point.
     pub r: [u8; 32],
@@ -142,6 +146,7 @@ impl Signature {
 
 /// A piece of a blob on its way.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Chunk {
     /// Where in the blob it starts.
     pub offset: u32,
@@ -151,6 +156,7 @@ pub struct Chunk {
 
 /// A blob in a slot, with a valid commit record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StoredBlob {
     /// Which slot, 0 or 1; 2: none, the device's factory blob is in use.
     pub slot: u8,
@@ -166,6 +172,7 @@ pub struct StoredBlob {
 
 /// What the self-tests of the active blob gave on this device.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SelfTestReport {
     /// How many the blob holds.
     pub tests: u16,
@@ -182,6 +189,7 @@ pub struct SelfTestReport {
 
 /// Matches with the noise of their pixels, in place of what the blob says of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NoisyMatches {
     /// Standard deviation of each pixel coordinate, px, in the range of the runtime's `MatchNoise`.
     pub noise_px: f32,
@@ -191,6 +199,7 @@ pub struct NoisyMatches {
 
 /// A point seen by two cameras.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Match {
     /// The sender's own number, given back with the answer.
     pub id: u32,
@@ -202,6 +211,7 @@ pub struct Match {
 
 /// One camera's pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sighting {
     /// Index of the camera in the blob.
     pub camera: u8,
@@ -213,6 +223,7 @@ pub struct Sighting {
 
 /// The answer to one [`Match`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Measured {
     /// The [`Match::id`] it answers.
     pub id: u32,
@@ -222,6 +233,7 @@ pub struct Measured {
 
 /// A triangulated point.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Point {
     /// x, y, z in the rig's frame, mm.
     pub point_mm: [f32; 3],
@@ -270,6 +282,7 @@ impl Point {
 
 /// Who the device is and what it takes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Hello {
     /// What kind of device this is.
     pub device: Name,
@@ -289,6 +302,7 @@ pub struct Hello {
 
 /// How the device is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Status {
     /// Since it started, ms.
     pub uptime_ms: u64,
@@ -331,6 +345,7 @@ pub enum Arithmetic {
 
 /// What a slot holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SlotState {
     /// Nothing that was ever finished.
     Empty,
@@ -349,6 +364,7 @@ pub enum SlotState {
 
 /// How far an update has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct UpdateStatus {
     /// Length of the new blob, bytes.
     pub length: u32,
@@ -360,6 +376,7 @@ pub struct UpdateStatus {
 
 /// What a device knows of the cameras it is built with, from its factory record.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rig {
     /// Serial number of the rig; empty if it has none.
     pub serial: Name,
@@ -369,6 +386,7 @@ pub struct Rig {
 
 /// The blob in use.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BlobStatus {
     /// Hash of the calibration it was packed from.
     pub identity: [u8; IDENTITY_LENGTH],
@@ -382,6 +400,7 @@ pub struct BlobStatus {
 
 /// A camera, of the blob in use or of the device itself.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CameraStatus {
     /// Its name.
     pub name: Name,

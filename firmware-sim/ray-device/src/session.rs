@@ -8,6 +8,9 @@
 //! A delimiter right behind another is silence, and a frame whose delimiter never comes is waited
 //! for.
 
+#[cfg(feature = "embedded-io-async")]
+use embedded_io_async::{Read, Write};
+
 use crate::frame::{FrameReader, FrameWriter, Received, Rejected};
 use crate::port::Link;
 use crate::protocol::{Refusal, Reply, Request};
@@ -61,10 +64,18 @@ impl Arrived {
         self.start += 1;
         Some(byte)
     }
+
+    /// After a read of so many bytes; whether there were any.
+    fn restart(&mut self, count: usize) -> bool {
+        self.start = 0;
+        self.end = count;
+        count > 0
+    }
 }
 
 /// Why a conversation paused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Paused {
     /// The other side closed the link.
     Closed,
@@ -94,6 +105,23 @@ impl Session {
         self.writer.seal(sequence, &reply)
     }
 
+    /// Looks at what has arrived, up to the first frame to send.
+    fn advance(&mut self, responder: &mut impl Responder) -> Next<'_> {
+        // A frame that a loop returns would stay borrowed in all its turns, so the loop asks for its length.
+        let mut length = None;
+        while !responder.is_over()
+            && length.is_none()
+            && let Some(byte) = self.arrived.next()
+        {
+            length = self.feed(byte, responder).map(<[u8]>::len);
+        }
+        match length.and_then(|length| self.writer.frame(length)) {
+            Some(frame) => Next::Send(frame),
+            None if responder.is_over() => Next::Pause,
+            None => Next::Read(&mut self.arrived),
+        }
+    }
+
     /// Converses until the other side closes the link, or until this responder's time is over.
     ///
     /// # Errors
@@ -104,19 +132,58 @@ impl Session {
         responder: &mut impl Responder,
     ) -> Result<Paused, L::Error> {
         loop {
-            while let Some(byte) = self.arrived.next() {
-                if let Some(frame) = self.feed(byte, responder) {
-                    link.write_all(frame)?;
+            match self.advance(responder) {
+                Next::Send(frame) => link.write_all(frame)?,
+                Next::Read(arrived) => {
+                    let count = link.read(&mut arrived.bytes)?;
+                    if !arrived.restart(count) {
+                        return Ok(Paused::Closed);
+                    }
                 }
-                if responder.is_over() {
-                    return Ok(Paused::Over);
-                }
+                Next::Pause => return Ok(Paused::Over),
             }
-            self.arrived.start = 0;
-            self.arrived.end = link.read(&mut self.arrived.bytes)?;
-            if self.arrived.end == 0 {
-                return Ok(Paused::Closed);
+        }
+    }
+
+    /// The same over an asynchronous stream, beside whatever else the executor runs. It waits for bytes and for their
+    /// sending; what a request takes it takes at once, the erasing of a block included.
+    ///
+    /// It may be dropped at any of its waits, as `select` does. A frame that was being sent then is lost, and
+    /// its request is answered when it is sent again.
+    ///
+    /// # Errors
+    /// If the stream broke.
+    #[cfg(feature = "embedded-io-async")]
+    pub async fn serve_async<L: Read + Write>(
+        &mut self,
+        link: &mut L,
+        responder: &mut impl Responder,
+    ) -> Result<Paused, L::Error> {
+        loop {
+            match self.advance(responder) {
+                Next::Send(frame) => {
+                    link.write_all(frame).await?;
+                    link.flush().await?;
+                }
+                Next::Read(arrived) => {
+                    let count = link.read(&mut arrived.bytes).await?;
+                    if !arrived.restart(count) {
+                        return Ok(Paused::Closed);
+                    }
+                }
+                Next::Pause => return Ok(Paused::Over),
             }
         }
     }
 }
+
+/// What a conversation does next.
+enum Next<'a> {
+    Send(&'a [u8]),
+    /// Everything was looked at.
+    Read(&'a mut Arrived),
+    Pause,
+}
+
+#[cfg(all(test, feature = "embedded-io", feature = "embedded-io-async"))]
+mod tests;

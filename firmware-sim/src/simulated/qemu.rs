@@ -1,15 +1,17 @@
 //! The same application as a Cortex-M4F image in QEMU, its UART on a TCP port.
 
+mod emulated;
 mod error;
 mod memory;
 
+pub use emulated::{DEVICE, Emulated, SOFT_FLOAT};
 pub use error::QemuError;
 
 use std::io::ErrorKind;
 use std::net::{SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Output, Stdio};
-use std::sync::{Arc, mpsc};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -21,9 +23,6 @@ use memory::{Backing, Memory};
 /// From the start of QEMU to the first answer of the device. It takes about a quarter of a second;
 /// the rest is for machines under load.
 const START_LIMIT: Duration = Duration::from_secs(30);
-
-/// How long an image that ends by itself may run. Checks take a second; one that crashes hangs.
-const RUN_LIMIT: Duration = Duration::from_mins(3);
 
 /// Free ports tried before giving up: between the choice of one and QEMU's use of it, somebody else
 /// may take it.
@@ -121,7 +120,7 @@ impl QemuDevice {
         image: &Path,
         backing: &Arc<Backing>,
     ) -> Result<Self, QemuError> {
-        let mut command = qemu_command(image, &Memory::File(backing.path()))?;
+        let mut command = DEVICE.command(image, &Memory::File(backing.path()))?;
         command.args(["-monitor", "none"]);
         command.args([
             "-serial",
@@ -172,23 +171,13 @@ impl Drop for QemuDevice {
     }
 }
 
-/// Builds the image of this name if it is missing or stale, and returns where it is.
+/// Builds the image of this name for the device's board if it is missing or stale, and returns where it is.
 ///
 /// # Errors
 /// [`QemuError`]; what to install if there is no toolchain is said on standard error.
 pub fn build_image(image: &str) -> Result<PathBuf, QemuError> {
-    build_images(&[image])?;
-    Ok(image_path(image))
-}
-
-/// Builds the image of this name for processors without a floating-point unit, and returns where it
-/// is: the same image, whose arithmetic is the compiler's own.
-///
-/// # Errors
-/// As [`build_image`].
-pub fn build_soft_float_image(image: &str) -> Result<PathBuf, QemuError> {
-    build(&[image], &["--target", SOFT_FLOAT_TARGET], &[])?;
-    Ok(image_of(SOFT_FLOAT_TARGET, image))
+    DEVICE.build(&[image])?;
+    Ok(DEVICE.image_path(image))
 }
 
 /// Builds the image of this name without what reads blobs of old versions, and returns where it is.
@@ -198,20 +187,12 @@ pub fn build_soft_float_image(image: &str) -> Result<PathBuf, QemuError> {
 pub fn build_newest_only_image(image: &str) -> Result<PathBuf, QemuError> {
     let folder = root().join("target/embedded/newest-only");
     let folder_argument = folder.display().to_string();
-    build(
+    DEVICE.build_with(
         &[image],
         &["--no-default-features", "--target-dir", &folder_argument],
         &[],
     )?;
-    Ok(folder.join(TARGET).join("release").join(image))
-}
-
-/// Builds the images of these names if they are missing or stale, in one go.
-///
-/// # Errors
-/// As [`build_image`].
-pub fn build_images(images: &[&str]) -> Result<(), QemuError> {
-    build(images, &[], &[])
+    Ok(folder.join(DEVICE.target).join("release").join(image))
 }
 
 /// Builds the image of this name for the owner of a key, 64 hexadecimal digits: its device takes no
@@ -221,56 +202,9 @@ pub fn build_images(images: &[&str]) -> Result<(), QemuError> {
 /// As [`build_image`].
 pub fn build_signed_image(image: &str, public_key: &str) -> Result<PathBuf, QemuError> {
     let key = ("RAYS_PUBLIC_KEY", public_key);
-    build(&[image], &["--features", "signed"], &[key])?;
-    Ok(image_path(image))
+    DEVICE.build_with(&[image], &["--features", "signed"], &[key])?;
+    Ok(DEVICE.image_path(image))
 }
-
-fn build(
-    images: &[&str],
-    arguments: &[&str],
-    environment: &[(&str, &str)],
-) -> Result<(), QemuError> {
-    let root = root();
-    let script = root.join("scripts/embedded-cargo.sh");
-    if !script.is_file() {
-        return Err(QemuError::NoSources {
-            path: root.join("firmware-sim/cortex-m"),
-        });
-    }
-    let status = Command::new(&script)
-        .args(["build", "--quiet", "--locked", "--release"])
-        .args(arguments)
-        .envs(environment.iter().copied())
-        .args(images.iter().flat_map(|image| ["--bin", image]))
-        .stdin(Stdio::null())
-        .stdout(std::io::stderr())
-        .status()
-        .map_err(|source| QemuError::Io {
-            what: script.display().to_string(),
-            source,
-        })?;
-    if !status.success() {
-        return Err(QemuError::Build {
-            image: images.join("`, `"),
-            status,
-        });
-    }
-    Ok(())
-}
-
-/// Where the image of this name is once it has been built; it may be stale.
-pub fn image_path(image: &str) -> PathBuf {
-    image_of(TARGET, image)
-}
-
-fn image_of(target: &str, image: &str) -> PathBuf {
-    let folder = root().join("target/embedded").join(target);
-    folder.join("release").join(image)
-}
-
-/// The target of images, set in `cortex-m/.cargo/config.toml`.
-const TARGET: &str = "thumbv7em-none-eabihf";
-const SOFT_FLOAT_TARGET: &str = "thumbv7em-none-eabi";
 
 /// The workspace's folder.
 fn root() -> &'static Path {
@@ -279,86 +213,20 @@ fn root() -> &'static Path {
         .unwrap_or(Path::new("."))
 }
 
-/// Runs an image that ends by itself, such as a check, and returns what it printed over semihosting
-/// and how it ended. One that still runs after three minutes is killed.
-///
-/// # Errors
-/// [`QemuError`].
-pub fn run_to_end(image: &Path, flash_file: Option<&Path>) -> Result<Output, QemuError> {
-    run_to_end_with(image, flash_file, &[])
-}
-
-/// The same in a time of its own, in which every instruction takes 2^`time_shift` nanoseconds and
-/// nothing else takes any: a timer then counts instructions.
-///
-/// # Errors
-/// [`QemuError`].
-pub fn run_counting(image: &Path, flash_file: &Path, time_shift: u32) -> Result<Output, QemuError> {
-    let time = format!("shift={time_shift}");
-    run_to_end_with(image, Some(flash_file), &["-icount", &time])
-}
-
-fn run_to_end_with(
-    image: &Path,
-    flash_file: Option<&Path>,
-    arguments: &[&str],
-) -> Result<Output, QemuError> {
-    require_qemu()?;
-    let memory = flash_file.map_or(Memory::Zero, Memory::StartsWith);
-    let mut child = qemu_command(image, &memory)?
-        .args(["-monitor", "none", "-serial", "none"])
-        .args(arguments)
-        .args(["-semihosting-config", "enable=on,target=native"])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::inherit())
-        .spawn()
-        .map_err(|source| QemuError::Io {
-            what: "starting QEMU through sh".into(),
-            source,
-        })?;
-    // Held open until QEMU has ended or its time is up: its end is what ends QEMU, and
-    // `wait_with_output` would close it at once.
-    let pipe = child.stdin.take();
-    let (ended, end) = mpsc::channel::<()>();
-    let watchdog = thread::spawn(move || {
-        let _ = end.recv_timeout(RUN_LIMIT);
-        drop(pipe);
-    });
-    let output = child.wait_with_output();
-    drop(ended);
-    let _ = watchdog.join();
-    output.map_err(|source| QemuError::Io {
-        what: "waiting for QEMU".into(),
-        source,
-    })
-}
-
-/// QEMU on this board with this image, set to end with its parent; the caller adds serial line and
-/// monitor.
-fn qemu_command(image: &Path, memory: &Memory<'_>) -> Result<Command, QemuError> {
-    let mut command = Command::new("sh");
-    command.args(["-c", ENDS_WITH_PARENT, "sh", "qemu-system-arm"]);
-    command.args(memory.arguments()?);
-    command.args(["-cpu", "cortex-m4", "-display", "none"]);
-    command.arg("-kernel").arg(image);
-    Ok(command)
-}
-
 /// Makes sure that QEMU is installed.
 ///
 /// # Errors
-/// As [`version`].
+/// As [`version_of`].
 pub fn require_qemu() -> Result<(), QemuError> {
-    version().map(|_| ())
+    version_of(DEVICE.emulator).map(|_| ())
 }
 
-/// What QEMU says of its version.
+/// What one of QEMU's programs says of its version.
 ///
 /// # Errors
 /// [`QemuError::NotInstalled`], with the remedy in its text.
-pub fn version() -> Result<String, QemuError> {
-    let output = Command::new("qemu-system-arm")
+pub fn version_of(emulator: &str) -> Result<String, QemuError> {
+    let output = Command::new(emulator)
         .arg("--version")
         .stdin(Stdio::null())
         .stderr(Stdio::null())
@@ -368,9 +236,11 @@ pub fn version() -> Result<String, QemuError> {
             let text = String::from_utf8_lossy(&output.stdout);
             Ok(text.lines().next().unwrap_or_default().trim().to_owned())
         }
-        Err(error) if error.kind() == ErrorKind::NotFound => Err(QemuError::NotInstalled),
+        Err(error) if error.kind() == ErrorKind::NotFound => Err(QemuError::NotInstalled {
+            program: emulator.to_owned(),
+        }),
         Err(source) => Err(QemuError::Io {
-            what: "qemu-system-arm --version".into(),
+            what: format!("{emulator} --version"),
             source,
         }),
     }

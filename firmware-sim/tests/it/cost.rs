@@ -145,6 +145,31 @@ fn a_blob_can_be_handed_in_and_the_tables_say_the_same() {
     }
 }
 
+/// The cores of the target that the soft-float check is built for, too: no other image to build.
+#[test]
+fn cores_of_another_target_are_counted_beside_their_conditions() {
+    let file = root().join("data/golden/central-v3-fast.rays");
+    let arguments = ["--target", "thumbv7m-none-eabi", "--blob"];
+    let arguments = [&arguments[..], &[file.to_str().unwrap()]].concat();
+    let across = counted(&arguments);
+    let [core] = across["cores"].as_array().unwrap().as_slice() else {
+        panic!("not one core: {across}");
+    };
+    assert_eq!(core["core"], "Cortex-M3");
+    assert_eq!(core["conditions"]["target"], "thumbv7m-none-eabi");
+    assert_eq!(core["conditions"]["known_block_counted"], 100);
+    let [blob] = core["blobs"].as_array().unwrap().as_slice() else {
+        panic!("not one blob: {across}");
+    };
+    // Emulated numbers cost much more than those of an FPU, which takes 485.
+    let triangulate = most(blob, "triangulate");
+    assert!((10_000..20_000).contains(&triangulate), "{triangulate}");
+    assert!(most(blob, "lookup") < triangulate);
+    let text = String::from_utf8(run(&arguments).stdout).unwrap();
+    let line = text.lines().find(|line| line.contains("Cortex-M3  "));
+    assert!(line.is_some() && text.contains("mps2-an385"), "{text}");
+}
+
 #[test]
 fn an_index_or_a_division_that_slips_in_breaks_the_link() {
     for image in ["panic_by_index", "panic_by_division"] {
@@ -180,6 +205,10 @@ fn what_cannot_be_counted_ends_with_code_2_and_its_reason() {
             "firmware-sim/Cargo.toml cannot be opened",
         ),
         (&["--json", "--markdown"], "--markdown"),
+        (
+            &["--target", "x86_64-unknown-linux-gnu"],
+            "thumbv6m-none-eabi",
+        ),
     ] {
         let output = run(arguments);
         let message = String::from_utf8_lossy(&output.stderr);

@@ -1,10 +1,15 @@
 //! The device from outside: its application on a simulated flash, over TCP and a serial line, as a process
 //! that is killed, and as an image in QEMU; what images cost.
 
+mod adoption;
 mod app;
+#[path = "../../../ray-runtime/tests/it/c_build.rs"]
+mod c_build;
+mod c_device;
 mod parts;
 mod power_cuts;
 mod rig;
+mod slot_image;
 mod snapshots;
 mod tcp;
 
@@ -12,6 +17,8 @@ mod tcp;
 mod cost;
 #[cfg(feature = "command")]
 mod flashing;
+#[cfg(feature = "command")]
+mod float_modes;
 #[cfg(feature = "command")]
 mod integer;
 #[cfg(feature = "command")]

@@ -23,7 +23,7 @@ fn check_images_print_what_they_should() {
         }
         let name = expected_file.file_stem().unwrap().to_str().unwrap();
         let image = qemu::build_image(name).unwrap();
-        let output = qemu::run_to_end(&image, Some(&flash)).unwrap();
+        let output = qemu::DEVICE.run_to_end(&image, Some(&flash)).unwrap();
         let printed = String::from_utf8(output.stdout).unwrap();
         assert!(
             output.status.success(),

@@ -1,6 +1,7 @@
-//! The C interface of `ray-runtime`; `rays.h` is its documentation and its other half.
+//! The C interface of `ray-runtime`; `rays.h` is its documentation and its other half. `rays_device.h` is that of
+//! [`health`], [`storage`] and [`driver`].
 //!
-//! All `unsafe` of the interface stands in this file. What C must promise is what `rays.h` says: a
+//! All `unsafe` of the interface stands in these four files. What C must promise is what `rays.h` says: a
 //! pointer is null or points to an object of its type, a rig is used only after [`rays_open`], and the
 //! blob stays where it is, unchanged, for as long as its rig is used.
 //!
@@ -9,6 +10,9 @@
 
 #![no_std]
 
+pub mod driver;
+pub mod health;
+pub mod storage;
 mod types;
 
 use core::ffi::c_int;
@@ -17,7 +21,9 @@ use ray_runtime::{
     MatchNoise, MeasureError, OpenError, PixelPoint, ProjectError, RayBlob, Readout, SensorWindow,
 };
 
-pub use types::{Camera, CameraReadout, CurvePoint, Measurement, Pixel, Point, Ray, Sighting};
+pub use types::{
+    Camera, CameraReadout, CurvePoint, Info, Measurement, Pixel, Point, Ray, Sighting,
+};
 
 /// Done.
 pub const OK: c_int = 0;
@@ -104,6 +110,35 @@ pub unsafe extern "C" fn rays_open(rig: *mut Rig, blob: *const u8, length: usize
     }
 }
 
+/// The version of this library: `RAYS_VERSION` of the header it was built with.
+#[unsafe(no_mangle)]
+pub extern "C" fn rays_version() -> u32 {
+    VERSION
+}
+
+/// 10000 major + 100 minor + patch.
+const VERSION: u32 = 10_000 * number(env!("CARGO_PKG_VERSION_MAJOR"))
+    + 100 * number(env!("CARGO_PKG_VERSION_MINOR"))
+    + number(env!("CARGO_PKG_VERSION_PATCH"));
+
+/// A number in decimal; does not compile for anything else.
+const fn number(text: &str) -> u32 {
+    match u32::from_str_radix(text, 10) {
+        Ok(number) => number,
+        Err(_) => panic!("not a number"),
+    }
+}
+
+/// What the blob says of itself.
+///
+/// # Safety
+/// As `rays.h` says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rays_info_of(rig: *const Rig, info: *mut Info) -> c_int {
+    // SAFETY: both are null or what they should be, says the caller.
+    unsafe { answer(rig, info, |blob| Ok(Info::of_rust(blob))) }
+}
+
 /// How many cameras there are; 0 if the rig is not open.
 ///
 /// # Safety
@@ -167,10 +202,30 @@ pub unsafe extern "C" fn rays_triangulate(
 ) -> c_int {
     let ask = |blob: &RayBlob<'_>| {
         let found = blob.triangulate(first.of_rust(), second.of_rust());
-        found.map_err(MeasureError::code).map(|found| Point {
-            point_mm: found.point_mm,
-            gap_squared_mm2: found.gap_squared_mm2,
-        })
+        found.map_err(MeasureError::code).map(Point::of_rust)
+    };
+    // SAFETY: both are null or what they should be, says the caller.
+    unsafe { answer(rig, point, ask) }
+}
+
+/// The point nearest to the rays of any number of cameras.
+///
+/// # Safety
+/// As `rays.h` says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rays_triangulate_many(
+    rig: *const Rig,
+    sightings: *const Sighting,
+    count: usize,
+    point: *mut Point,
+) -> c_int {
+    // SAFETY: null or as many sightings as stated, says the caller.
+    let Some(sightings) = (unsafe { slice(sightings, count) }) else {
+        return BAD_ARGUMENT;
+    };
+    let ask = |blob: &RayBlob<'_>| {
+        let found = blob.triangulate_many(sightings);
+        found.map_err(MeasureError::code).map(Point::of_rust)
     };
     // SAFETY: both are null or what they should be, says the caller.
     unsafe { answer(rig, point, ask) }
@@ -388,12 +443,13 @@ fn no_camera(blob: &RayBlob<'_>, camera: usize) -> u8 {
     ProjectError::NoSuchCamera { camera, count }.code()
 }
 
-/// The bytes, unless the pointer is null or no object has that many.
+/// The bytes or items, unless the pointer is null or no object has that many.
 ///
 /// # Safety
-/// `start` is null or points to `length` bytes that nobody changes during `'a`.
-unsafe fn slice<'a>(start: *const u8, length: usize) -> Option<&'a [u8]> {
-    if start.is_null() || isize::try_from(length).is_err() {
+/// `start` is null or points to `length` items that nobody changes during `'a`.
+unsafe fn slice<'a, T>(start: *const T, length: usize) -> Option<&'a [T]> {
+    let bytes = length.checked_mul(size_of::<T>())?;
+    if start.is_null() || isize::try_from(bytes).is_err() {
         return None;
     }
     // SAFETY: not null, not too long, and the rest is the caller's word.

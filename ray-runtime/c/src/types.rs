@@ -1,7 +1,8 @@
 //! What crosses the interface by value: the structs of `rays.h`, field by field.
 
 use core::ffi::{c_char, c_int};
-use ray_runtime::PixelPoint;
+use ray_runtime::format::IDENTITY_LEN;
+use ray_runtime::{PixelPoint, RayBlob, Triangulation};
 
 /// A pixel of a camera.
 #[repr(C)]
@@ -18,6 +19,26 @@ pub struct Sighting {
 pub struct Pixel {
     pub(crate) u_px: f32,
     pub(crate) v_px: f32,
+}
+
+/// What a blob says of itself.
+#[repr(C)]
+pub struct Info {
+    pub(crate) identity: [u8; IDENTITY_LEN],
+    pub(crate) max_error_px: f32,
+    pub(crate) working_distance_mm: f32,
+    pub(crate) blob_len: usize,
+}
+
+impl Info {
+    pub(crate) fn of_rust(blob: &RayBlob<'_>) -> Self {
+        Self {
+            identity: *blob.identity(),
+            max_error_px: blob.max_error_px(),
+            working_distance_mm: blob.working_distance_mm(),
+            blob_len: blob.len(),
+        }
+    }
 }
 
 /// A camera of the blob.
@@ -60,6 +81,15 @@ pub struct Point {
     pub(crate) gap_squared_mm2: f32,
 }
 
+impl Point {
+    pub(crate) fn of_rust(found: Triangulation) -> Self {
+        Self {
+            point_mm: found.point_mm,
+            gap_squared_mm2: found.gap_squared_mm2,
+        }
+    }
+}
+
 /// A triangulated point with its standard deviations, rig frame.
 #[repr(C)]
 pub struct Measurement {
@@ -67,6 +97,8 @@ pub struct Measurement {
     pub(crate) gap_squared_mm2: f32,
     pub(crate) sigma_mm: [f32; 3],
     pub(crate) has_sigma: c_int,
+    pub(crate) gap_mm: f32,
+    pub(crate) gap_variance_mm2: f32,
 }
 
 impl Measurement {
@@ -77,6 +109,8 @@ impl Measurement {
             gap_squared_mm2: measured.found.gap_squared_mm2,
             sigma_mm: sigma_mm.unwrap_or_default(),
             has_sigma: sigma_mm.is_some().into(),
+            gap_mm: measured.signed_gap_mm(),
+            gap_variance_mm2: measured.covariance.map_or(0.0, |known| known.gap_mm2),
         }
     }
 }
@@ -93,6 +127,12 @@ impl From<PixelPoint> for Pixel {
 impl From<Pixel> for PixelPoint {
     fn from(pixel: Pixel) -> Self {
         Self::new(pixel.u_px, pixel.v_px)
+    }
+}
+
+impl From<Sighting> for (usize, PixelPoint) {
+    fn from(sighting: Sighting) -> Self {
+        sighting.of_rust()
     }
 }
 

@@ -3,6 +3,7 @@
 /// How a camera's table is stored. Every form gives, for a pixel, the half-angle vector of its ray
 /// and, if the camera is not central, the scaled offset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Encoding {
     /// What the table is made of.
     pub form: Form,
@@ -12,6 +13,7 @@ pub struct Encoding {
 
 /// What a table is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Form {
     /// Knots of a bicubic B-spline, f32. The only form of versions 1 and 2; no longer written.
     Spline,

@@ -16,7 +16,7 @@ pub(crate) struct Messages<'a> {
 impl<'a> Messages<'a> {
     pub fn meta(&mut self) -> Option<Meta<'a>> {
         Some(Meta {
-            identity: self.take()?,
+            identity: self.bytes()?,
             frame: self.text()?,
             written_by: self.text()?,
             pixel_convention: match self.integer()? {
@@ -107,7 +107,17 @@ impl<'a> Messages<'a> {
 
     #[inline(never)]
     fn text(&mut self) -> Option<&'a str> {
-        self.take()
+        core::str::from_utf8(self.bytes()?).ok()
+    }
+
+    /// Their length is a u32 on every target: postcard reads as many digits as its `usize` has, so that a host
+    /// would take lengths that a device refuses.
+    #[inline(never)]
+    fn bytes(&mut self) -> Option<&'a [u8]> {
+        let length = usize::try_from(self.integer()?).ok()?;
+        let (bytes, rest) = self.rest.split_at_checked(length)?;
+        self.rest = rest;
+        Some(bytes)
     }
 
     #[inline(never)]

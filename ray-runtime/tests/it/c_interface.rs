@@ -3,12 +3,16 @@
 
 use ray_runtime::{
     Aligned, EpipolarCurve, LookupError, MatchNoise, MeasureError, Measurement, OpenError,
-    PixelPoint, ProjectError, Ray, RayBlob, Readout, ReadoutError, SensorWindow, Table,
+    PixelPoint, ProjectError, Ray, RayBlob, Readout, ReadoutError, Rounding, SensorWindow, Table,
     Triangulation,
 };
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
-use std::sync::{Mutex, PoisonError};
+use std::path::Path;
+use std::process::Command;
+
+use super::c_build::{
+    Arm, CORTEX_M0, CORTEX_M4, CORTEX_M4F, WARNINGS, build_for_host, c_folder, made, root, run,
+    succeed,
+};
 
 static GOLDEN: [(&str, &Aligned<[u8]>); 4] = [
     (
@@ -30,64 +34,6 @@ static GOLDEN: [(&str, &Aligned<[u8]>); 4] = [
 ];
 
 const HEADER: &str = include_str!("../../c/rays.h");
-/// As strict as a C compiler gets.
-pub(super) const WARNINGS: [&str; 4] = ["-Wall", "-Wextra", "-Wpedantic", "-Werror"];
-
-pub(super) fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .unwrap()
-        .to_owned()
-}
-
-pub(super) fn c_folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("c")
-}
-
-/// A file that a test makes.
-pub(super) fn made(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_TARGET_TMPDIR")).join(name)
-}
-
-/// What a command printed, which must succeed.
-pub(super) fn succeed(command: &mut Command) -> String {
-    let output = run(command);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(
-        output.status.success(),
-        "{command:?}: {}\n{said}",
-        output.status
-    );
-    String::from_utf8(output.stdout).unwrap()
-}
-
-fn run(command: &mut Command) -> Output {
-    command.stdin(Stdio::null()).output().unwrap_or_else(|error| {
-        panic!("{command:?} cannot be run ({error}): install a C compiler, or run scripts/install-embedded.sh")
-    })
-}
-
-/// Builds the library for the host, in a target folder of its own and without what the cargo that
-/// runs this test left in the environment.
-pub(super) fn build_for_host(name: &str, more: &[&str]) -> PathBuf {
-    // One at a time: each build puts its library in the same place.
-    static BUILDING: Mutex<()> = Mutex::new(());
-    let _building = BUILDING.lock().unwrap_or_else(PoisonError::into_inner);
-    let target_dir = root().join("target/c");
-    let mut command = Command::new(env!("CARGO"));
-    command
-        .args(["build", "--release", "--locked", "--quiet"])
-        .args(more)
-        .current_dir(c_folder())
-        .env("CARGO_TARGET_DIR", &target_dir)
-        .env_remove("RUSTFLAGS")
-        .env_remove("CARGO_ENCODED_RUSTFLAGS");
-    succeed(&mut command);
-    let library = made(name);
-    std::fs::copy(target_dir.join("release/librays.a"), &library).unwrap();
-    library
-}
-
 fn link_for_host(library: &Path, program: &Path) -> Command {
     let mut command = Command::new("cc");
     command
@@ -119,6 +65,7 @@ impl Pixels {
 fn expected(blob: &RayBlob<'_>) -> (String, usize) {
     let (cameras, tests) = (blob.camera_count(), blob.run_self_tests().unwrap());
     let mut text = format!("cameras {cameras:02x}, self-tests {tests:02x} passed\n");
+    text += &expected_info(blob);
     text += &expected_window(blob);
     let mut pixels = Pixels(1);
     let mut points = 0;
@@ -132,19 +79,26 @@ fn expected(blob: &RayBlob<'_>) -> (String, usize) {
         };
         text += &field(ray.map(of_ray));
 
-        let of_point =
-            |found: Triangulation| [found.point_mm.as_slice(), &[found.gap_squared_mm2]].concat();
         let point = blob.triangulate(first, second);
         points += usize::from(point.is_ok());
         text += &field(point.map(of_point).map_err(MeasureError::code));
         if let (Ok(point), 0) = (point, number % 32) {
-            text += &expected_search(blob, first, &point);
+            text += &expected_search(blob, first, second, &point);
         }
 
         let measured = blob.triangulate_with_covariance(first, second);
         let of_measurement = |measured: Measurement| {
             let sigma_mm = measured.covariance.map(|c| c.sigma_mm().to_vec());
-            [of_point(measured.found), sigma_mm.unwrap_or_default()].concat()
+            let gap = [
+                measured.signed_gap_mm(),
+                measured.covariance.map_or(0.0, |known| known.gap_mm2),
+            ];
+            [
+                of_point(measured.found),
+                sigma_mm.unwrap_or_default(),
+                gap.to_vec(),
+            ]
+            .concat()
         };
         text += &field(measured.map(of_measurement).map_err(MeasureError::code));
         if measured.is_ok() && number % 32 == 0 {
@@ -158,10 +112,27 @@ fn expected(blob: &RayBlob<'_>) -> (String, usize) {
     (text, points)
 }
 
+fn of_point(found: Triangulation) -> Vec<f32> {
+    let [x, y, z] = found.point_mm;
+    vec![x, y, z, found.gap_squared_mm2]
+}
+
+/// What `print_info` must print.
+fn expected_info(blob: &RayBlob<'_>) -> String {
+    let identity = blob.identity().map(|byte| format!("{byte:02x}")).concat();
+    let [error, distance] =
+        [blob.max_error_px(), blob.working_distance_mm()].map(|number| number.to_bits());
+    let length = blob.len();
+    format!(
+        "info | 00 {identity} {error:08x} {distance:08x} {length:08x}, header and library agree\n"
+    )
+}
+
 /// What `print_search` must print.
 fn expected_search(
     blob: &RayBlob<'_>,
     first: (usize, PixelPoint),
+    second: (usize, PixelPoint),
     point: &Triangulation,
 ) -> String {
     let of_pixel = |pixel: PixelPoint| vec![pixel.u, pixel.v];
@@ -180,7 +151,10 @@ fn expected_search(
             .collect()
     };
     let curve = blob.epipolar_curve(first, 1, [100.0, 3000.0], 8);
-    text + &field(curve.map(of_curve).map_err(MeasureError::code))
+    text += &field(curve.map(of_curve).map_err(MeasureError::code));
+    let third = PixelPoint::new(second.1.u + 0.5, second.1.v - 0.25);
+    let nearest = blob.triangulate_many(&[first, second, (1, third)]);
+    text + &field(nearest.map(of_point).map_err(MeasureError::code))
 }
 
 /// What `print_window` must print.
@@ -272,6 +246,12 @@ fn codes_of_the_header_are_those_of_rust() {
         ("BAD_PAIR", OpenError::BadPair { pair: 0 }),
         ("BAD_SECTION", OpenError::BadSection { section: 0 }),
         ("UNKNOWN_SECTION", OpenError::UnknownSection { tag: 0 }),
+        (
+            "WRONG_ROUNDING",
+            OpenError::WrongRounding {
+                found: Rounding::TowardZero,
+            },
+        ),
     ];
     let measure = [
         ("OUTSIDE", MeasureError::Outside { camera: 0 }),
@@ -284,6 +264,7 @@ fn codes_of_the_header_are_those_of_rust() {
         ),
         ("PARALLEL", MeasureError::Parallel),
         ("BEHIND", MeasureError::Behind),
+        ("TOO_FEW_RAYS", MeasureError::TooFewRays { have: 0 }),
     ];
     let others = [
         ("UNSEEN", ProjectError::Unseen.code()),
@@ -313,6 +294,7 @@ fn codes_of_the_header_are_those_of_rust() {
         .collect();
     let mut found: Vec<(String, u8)> = HEADER
         .lines()
+        .filter(|line| line.trim().starts_with("RAYS_"))
         .filter_map(|line| {
             let (name, rest) = line.trim().split_once(" = ")?;
             let code = rest.split([',', ' ']).next()?;
@@ -322,6 +304,21 @@ fn codes_of_the_header_are_those_of_rust() {
     expected.sort();
     found.sort();
     assert_eq!(found, expected);
+}
+
+#[test]
+fn the_version_of_the_header_is_that_of_the_library() {
+    let part = |name: &str| {
+        let line = format!("#define RAYS_VERSION_{name} ");
+        let found = HEADER.lines().find_map(|text| text.strip_prefix(&line));
+        found.unwrap_or_else(|| panic!("no {name}")).to_owned()
+    };
+    let stated = ["MAJOR", "MINOR", "PATCH"].map(part).join(".");
+    let manifest = std::fs::read_to_string(c_folder().join("Cargo.toml")).unwrap();
+    assert!(
+        manifest.contains(&format!("version = \"{stated}\"")),
+        "{stated}"
+    );
 }
 
 #[test]
@@ -349,85 +346,22 @@ fn what_cannot_be_opened_or_asked_has_its_code() {
     assert_eq!(printed, "all as it should be\n");
 }
 
-/// A kind of Arm: its Rust target, what its C compiler is told, and where QEMU runs it.
-struct Arm {
-    target: &'static str,
-    flags: &'static [&'static str],
-    machine: [&'static str; 2],
-}
-
-/// Ends with this code where there is no toolchain for a target.
-const NO_TOOLCHAIN: i32 = 3;
-
 #[test]
 fn the_example_gives_the_bits_of_rust_with_an_fpu() {
-    check_arm(&Arm {
-        target: "thumbv7em-none-eabihf",
-        flags: &["-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"],
-        machine: ["mps2-an386", "cortex-m4"],
-    });
+    check_arm(&CORTEX_M4F);
 }
 
 #[test]
 fn the_example_gives_the_bits_of_rust_without_an_fpu() {
     // Of the two, the smaller one has no division either.
-    check_arm(&Arm {
-        target: "thumbv7em-none-eabi",
-        flags: &["-mcpu=cortex-m4", "-mfloat-abi=soft"],
-        machine: ["mps2-an386", "cortex-m4"],
-    });
-    check_arm(&Arm {
-        target: "thumbv6m-none-eabi",
-        flags: &["-mcpu=cortex-m0", "-mfloat-abi=soft"],
-        machine: ["mps2-an385", "cortex-m3"],
-    });
+    check_arm(&CORTEX_M4);
+    check_arm(&CORTEX_M0);
 }
 
 fn check_arm(arm: &Arm) {
-    const COMPILER: &str = "arm-none-eabi-gcc";
-    if Command::new(COMPILER).arg("--version").output().is_err() {
-        eprintln!(
-            "{COMPILER} is missing, so C was not tried on {}: install gcc-arm-none-eabi, or run scripts/install-embedded.sh",
-            arm.target
-        );
-        return;
+    if let Some(image) = arm.build("example", &["example.c", "qemu.c"]) {
+        check_bits(|blob| arm.run(&image, blob));
     }
-    let mut build = Command::new(root().join("scripts/embedded-cargo.sh"));
-    build.args(["build", "--release", "--locked", "--quiet"]);
-    build.args(["--target", arm.target, "--manifest-path"]);
-    let output = run(build.arg(c_folder().join("Cargo.toml")));
-    let said = String::from_utf8_lossy(&output.stderr);
-    if output.status.code() == Some(NO_TOOLCHAIN) {
-        eprintln!("C was not tried on {}: {said}", arm.target);
-        return;
-    }
-    assert!(output.status.success(), "{}: {said}", arm.target);
-
-    let library = root().join("target/embedded").join(arm.target);
-    let image = made(&format!("example-{}.elf", arm.target));
-    let mut link = Command::new(COMPILER);
-    link.args(["-mthumb", "-std=c99", "-O2", "-ffreestanding", "-nostdlib"])
-        .args(arm.flags)
-        .args(WARNINGS)
-        // Without --gc-sections: no part of the library may refer to what exists nowhere.
-        .args(["-Wl,-z,noexecstack", "-T", "qemu.ld", "example.c", "qemu.c"])
-        .arg(library.join("release/librays.a"))
-        .arg("-o")
-        .arg(&image)
-        .current_dir(c_folder());
-    succeed(&mut link);
-    check_bits(|blob| {
-        let [machine, cpu] = arm.machine;
-        let file = blob.display().to_string().replace(',', ",,");
-        let loader = format!("loader,file={file},addr=0x21000000,force-raw=on");
-        let mut qemu = Command::new("timeout");
-        qemu.args(["120", "qemu-system-arm", "-machine", machine, "-cpu", cpu])
-            .args(["-display", "none", "-monitor", "none", "-serial", "none"])
-            .args(["-semihosting-config", "enable=on,target=native"])
-            .args(["-device", &loader, "-kernel"])
-            .arg(&image);
-        succeed(&mut qemu)
-    });
 }
 
 #[test]

@@ -40,6 +40,7 @@ int main(int count, char **arguments)
     EXPECT(rays_camera_count(&rig), 0);
     EXPECT(rays_camera_count(NULL), 0);
     EXPECT(rays_lookup(&rig, first, &ray), RAYS_NOT_OPEN);
+    EXPECT(rays_triangulate_many(&rig, &first, 1, &point), RAYS_NOT_OPEN);
     EXPECT(rays_self_test(&rig, &number), RAYS_NOT_OPEN);
     EXPECT(number, 7);
 
@@ -94,6 +95,29 @@ int main(int count, char **arguments)
     EXPECT(rays_match_noise(&rig, NULL), RAYS_BAD_ARGUMENT);
     EXPECT(rays_match_noise(&rig, &noise_px), RAYS_OK);
     EXPECT(noise_px == -1.0f, 1);
+
+    EXPECT(measurement.gap_variance_mm2 > 0.0f, 1);
+    EXPECT(measurement.gap_mm * measurement.gap_mm > 0.999f * measurement.gap_squared_mm2, 1);
+
+    /* Any number of sightings, and what the blob says of itself. */
+    rays_sighting many[3] = {first, second, second};
+    rays_point nearest;
+    EXPECT(rays_triangulate_many(&rig, NULL, 2, &nearest), RAYS_BAD_ARGUMENT);
+    EXPECT(rays_triangulate_many(&rig, many, SIZE_MAX / 4, &nearest), RAYS_BAD_ARGUMENT);
+    EXPECT(rays_triangulate_many(&rig, many, 2, NULL), RAYS_BAD_ARGUMENT);
+    EXPECT(rays_triangulate_many(&rig, many, 1, &nearest), RAYS_TOO_FEW_RAYS);
+    EXPECT(rays_triangulate_many(&rig, many + 1, 2, &nearest), RAYS_PARALLEL);
+    EXPECT(rays_triangulate_many(&rig, many, 3, &nearest), RAYS_OK);
+    many[2].camera = 9;
+    EXPECT(rays_triangulate_many(&rig, many, 3, &nearest), RAYS_NO_SUCH_CAMERA);
+    EXPECT(rays_triangulate(&rig, first, second, &point), RAYS_OK);
+    EXPECT(rays_triangulate_many(&rig, many, 2, &nearest), RAYS_OK);
+    EXPECT(memcmp(&nearest, &point, sizeof point), 0);
+    rays_info info;
+    EXPECT(rays_info_of(&rig, NULL), RAYS_BAD_ARGUMENT);
+    EXPECT(rays_info_of(&rig, &info), RAYS_OK);
+    EXPECT(info.blob_len, length);
+    EXPECT(info.max_error_px > 0.0f && info.max_error_px < 1.0f, 1);
 
     /* Cameras, projections, curves, windows. */
     rays_camera camera;

@@ -1,7 +1,8 @@
 //! `c/rays.hpp`: its example by each C++ compiler that is there, held against Rust bit by bit, and all that can be done
 //! wrong with it; with exceptions and without, and for a device.
 
-use super::c_interface::{WARNINGS, build_for_host, c_folder, check_bits, made, root, succeed};
+use super::c_build::{WARNINGS, build_for_host, c_folder, made, root, succeed};
+use super::c_interface::check_bits;
 use std::path::Path;
 use std::process::Command;
 

@@ -6,7 +6,7 @@ use ray_runtime::format::Header;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-fn golden() -> Vec<PathBuf> {
+pub fn golden() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/golden");
     let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
         .unwrap()
@@ -21,14 +21,14 @@ fn golden() -> Vec<PathBuf> {
 }
 
 /// What a reader made of a blob.
-struct Read {
-    code: i32,
-    printed: String,
-    said: String,
+pub struct Read {
+    pub code: i32,
+    pub printed: String,
+    pub said: String,
 }
 
 /// Runs a reader on each of these.
-fn read(reader: &str, blobs: &[PathBuf]) -> Vec<Read> {
+pub fn read(reader: &str, blobs: &[PathBuf]) -> Vec<Read> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it");
     let output = Command::new("python3")
         // Without the folder of compiled modules that Python would leave here.

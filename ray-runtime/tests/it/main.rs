@@ -1,6 +1,8 @@
 //! The runtime from outside: golden blobs, blobs made by hand and damaged ones, and its C interface.
 
+mod c_build;
 mod c_interface;
+mod c_packages;
 mod cpp_interface;
 mod damage;
 mod document;
@@ -13,3 +15,4 @@ mod rows;
 mod sections;
 mod test_blob;
 mod uncertainty;
+mod varints;

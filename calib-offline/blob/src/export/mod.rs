@@ -160,13 +160,24 @@ pub fn file(blob: &[u8], form: &Form) -> Result<Vec<u8>, ExportError> {
     match form {
         Form::Hex { base_address } => {
             check_address(*base_address, ALIGNMENT, blob.len())?;
-            Ok(hex::file(blob, *base_address))
+            Ok(hex::file(&[(*base_address, blob)]))
         }
         Form::Uf2(uf2) => uf2::file(blob, uf2),
         Form::Binary => Ok(blob.to_vec()),
         Form::C { name } if c_array::is_name(name) => Ok(c_array::file(blob, name)),
         Form::C { name } => Err(ExportError::BadName { name: name.clone() }),
     }
+}
+
+/// Intel HEX of pieces of memory, each with its address, in ascending order.
+///
+/// # Errors
+/// [`ExportError::TooHigh`].
+pub fn hex_of_pieces(pieces: &[(u32, &[u8])]) -> Result<Vec<u8>, ExportError> {
+    for (address, bytes) in pieces {
+        check_address(*address, 1, bytes.len())?;
+    }
+    Ok(hex::file(pieces))
 }
 
 const ALIGNMENT: u32 = ray_runtime::format::ALIGNMENT as u32;

@@ -41,6 +41,9 @@ impl Remedy for BlobError {
                 OpenError::TrailingBytes { .. } | OpenError::BadCrc { .. } => {
                     "the file was damaged on the way: copy it again, binary"
                 }
+                OpenError::WrongRounding { .. } => {
+                    "nothing is wrong with the file: something in this process has changed how the processor rounds; set it to nearest"
+                }
                 _ => "pack the calibration again",
             },
         };

@@ -7,6 +7,7 @@ use crate::storage::OTHER_PART;
 
 /// Why a frame or a request was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Refusal {
     /// More bytes than a frame may have came without a delimiter.
     Oversized {
@@ -105,6 +106,7 @@ pub enum Refusal {
 
 /// What of a camera, or of the rig, is not the device's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RigPart {
     /// The number of cameras.
     Count,
@@ -120,6 +122,7 @@ pub enum RigPart {
 
 /// What flash can fail to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FlashOperation {
     /// Reading.
     Read,
@@ -146,6 +149,12 @@ impl core::fmt::Display for Refusal {
                     2 => "its flash holds no blob",
                     3 => "the blob in its flash is of a version that it does not read",
                     5 => "the blob in its flash is damaged",
+                    16 => {
+                        return write!(
+                            out,
+                            "{WRONG_ROUNDING} (code {open_error}): mend its firmware, the blob is well"
+                        );
+                    }
                     OTHER_PART => {
                         "its slot was written for another part, with another program unit or erase block"
                     }
@@ -231,6 +240,9 @@ impl core::fmt::Display for Refusal {
     }
 }
 
+const WRONG_ROUNDING: &str =
+    "its processor does not round to nearest, so no blob can be read as it was meant";
+
 /// The codes are the runtime's; these are the ones that a user can act upon.
 fn write_not_a_blob(out: &mut core::fmt::Formatter<'_>, open_error: u8) -> core::fmt::Result {
     let reason = match open_error {
@@ -242,6 +254,7 @@ fn write_not_a_blob(out: &mut core::fmt::Formatter<'_>, open_error: u8) -> core:
         15 => {
             "the blob says what a device must know to measure with it, and this one does not: bring its firmware up to date"
         }
+        16 => WRONG_ROUNDING,
         _ => "what was sent cannot be opened as a blob: pack it again",
     };
     write!(out, "{reason} (code {open_error})")

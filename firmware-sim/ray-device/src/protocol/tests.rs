@@ -458,7 +458,7 @@ fn a_long_name_is_cut_at_a_character() {
 /// The words for a code are tied to the runtime's numbering.
 #[test]
 fn a_refusal_for_want_of_a_blob_says_why() {
-    use ray_runtime::OpenError;
+    use ray_runtime::{OpenError, Rounding};
     for (error, words) in [
         (OpenError::BadMagic { found: 0 }, "holds no blob"),
         (
@@ -476,6 +476,12 @@ fn a_refusal_for_want_of_a_blob_says_why() {
             "damaged",
         ),
         (OpenError::BadHeader, "cannot be opened (code 7): flash one"),
+        (
+            OpenError::WrongRounding {
+                found: Rounding::TowardZero,
+            },
+            "round to nearest",
+        ),
     ] {
         let text = Refusal::NoBlob {
             open_error: error.code(),

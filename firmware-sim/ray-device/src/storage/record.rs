@@ -20,6 +20,7 @@ use crate::frame::checksum;
 /// What the owner's newest manifest claims; carried on from record to record. All 0 for a device without
 /// an owner.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Claims {
     /// The highest version that was ever made active.
     pub newest_version: u32,
@@ -31,6 +32,7 @@ pub struct Claims {
 
 /// What makes the blob of a slot count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Record {
     /// The highest one wins; from 1.
     pub sequence: u32,

@@ -74,7 +74,7 @@ impl PublicKey {
                 _ => None,
             }
         }
-        let Some(digits) = text.as_bytes().as_array::<64>() else {
+        let Some((digits, [])) = text.as_bytes().split_first_chunk::<64>() else {
             return None;
         };
         let mut key = [0; 32];

@@ -15,9 +15,13 @@ use crate::simulated::flash_file::{FLASH_LENGTH, FlashFileError};
 pub enum QemuError {
     /// QEMU is not installed.
     #[error(
-        "qemu-system-arm is not installed: apt-get install qemu-system-arm, or run scripts/install-embedded.sh"
+        "{program} is not installed: apt-get install {}, or run scripts/install-embedded.sh",
+        package(program)
     )]
-    NotInstalled,
+    NotInstalled {
+        /// Which of its programs.
+        program: String,
+    },
     /// The sources of the image are not where this program was built.
     #[error("no sources for the image at {}: run from a checkout, or give an image with --image", path.display())]
     NoSources {
@@ -68,4 +72,13 @@ pub enum QemuError {
     /// The device did not answer.
     #[error("QEMU runs, but the device in it does not answer")]
     Silent(#[source] ClientError),
+}
+
+/// Debian's package of one of QEMU's programs.
+fn package(program: &str) -> &str {
+    if program == "qemu-system-riscv32" {
+        "qemu-system-misc"
+    } else {
+        program
+    }
 }

@@ -6,12 +6,10 @@ use std::process::Stdio;
 
 use tempfile::NamedTempFile;
 
+use super::emulated::Emulated;
 use super::error::QemuError;
 use crate::simulated::flash_file::{FLASH_LENGTH, FlashFile, Kept};
 use crate::simulated::sim_flash::Rules;
-
-/// Where the emulated flash starts in the board's memory.
-const FLASH_START: usize = 0x2100_0000;
 
 /// The file that QEMU maps as the board's flash.
 #[derive(Debug)]
@@ -62,7 +60,7 @@ impl Backing {
 pub enum Memory<'a> {
     /// Memory full of zeros.
     Zero,
-    /// Memory that starts with the contents of this file, for checks that only read.
+    /// Behind the program, the contents of this file, for checks that only read.
     StartsWith(&'a Path),
     /// This very file, of the flash's length: what the device writes is in it at once.
     File(&'a Path),
@@ -70,7 +68,7 @@ pub enum Memory<'a> {
 
 impl Memory<'_> {
     /// What to start QEMU with.
-    pub fn arguments(&self) -> Result<Vec<String>, QemuError> {
+    pub fn arguments(&self, board: &Emulated<'_>) -> Result<Vec<String>, QemuError> {
         let mut arguments = Vec::new();
         if let Self::File(path) = self {
             let (file, size) = (in_option(path), FLASH_LENGTH);
@@ -80,18 +78,19 @@ impl Memory<'_> {
             ));
             // What QEMU takes for this board's main memory is the PSRAM that stands for the flash.
             arguments.push("-machine".to_owned());
-            arguments.push("mps2-an386,memory-backend=flash".to_owned());
+            arguments.push(format!("{},memory-backend=flash", board.machine));
             return Ok(arguments);
         }
         arguments.push("-machine".to_owned());
-        arguments.push("mps2-an386".to_owned());
+        arguments.push(board.machine.to_owned());
         if let Self::StartsWith(path) = self
             && length_of(path)? > 0
         {
             let file = in_option(path);
             arguments.push("-device".to_owned());
             arguments.push(format!(
-                "loader,file={file},addr={FLASH_START:#x},force-raw=on"
+                "loader,file={file},addr={:#x},force-raw=on",
+                board.stored_at
             ));
         }
         Ok(arguments)
