@@ -6,10 +6,10 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::{
-    BlobStatus, CameraStatus, Chunk, FlashOperation, Hello, MAX_CAMERAS_LISTED, MAX_CHUNK,
-    MAX_MATCHES, MAX_NAME, Match, Measured, Name, NewBlob, NoisyMatches, Point, Refusal, Reply,
-    Request, Rig, RigPart, SelfTestReport, Sighting, Signature, SlotState, Status, StoredBlob,
-    UpdateStatus, name,
+    Arithmetic, BlobStatus, CameraStatus, Chunk, FlashOperation, Hello, MAX_CAMERAS_LISTED,
+    MAX_CHUNK, MAX_MATCHES, MAX_NAME, Match, Measured, Name, NewBlob, NoisyMatches, Point, Refusal,
+    Reply, Request, Rig, RigPart, SelfTestReport, Sighting, Signature, SlotState, Status,
+    StoredBlob, UpdateStatus, name,
 };
 use crate::frame::{FrameWriter, MAX_MESSAGE};
 use crate::health::{GapReport, Predicted};
