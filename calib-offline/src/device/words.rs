@@ -182,6 +182,7 @@ mod tests {
             rig: None,
             gaps: None,
             owner: None,
+            arithmetic: "f32",
         }
     }
 
