@@ -224,7 +224,7 @@ fn verifying_takes_a_counted_number_of_instructions() {
     const TICKS_PER_INSTRUCTION: f64 = 1024.0 / 40.0;
     let image = qemu::build_signed_image("counting_signature", Keys::one(key(0).public())).unwrap();
     let blob = tempfile::NamedTempFile::new().unwrap();
-    let output = qemu::run_counting(&image, blob.path(), 10).unwrap();
+    let output = qemu::DEVICE.run_counting(&image, blob.path(), 10).unwrap();
     assert!(output.status.success());
     let printed = String::from_utf8(output.stdout).unwrap();
     let counted: Vec<f64> = printed
