@@ -2,8 +2,8 @@
 
 use super::settings::CommonArgs;
 use super::{
-    audit, calibrate, compare, demo, detect, device, evaluate, export, flash, import, inspect,
-    measure, methods, pack, rays, simulate, target, verify,
+    audit, calibrate, compare, completions, demo, detect, device, evaluate, export, flash, import,
+    inspect, man, measure, methods, pack, rays, simulate, target, verify,
 };
 use clap::{Parser, Subcommand};
 
@@ -56,6 +56,8 @@ pub enum Verb {
     Calibrate(calibrate::CalibrateArgs),
     /// Compare two calibrations of one rig: their difference, beside the predicted one
     Compare(compare::CompareArgs),
+    /// Print what a shell needs to complete commands
+    Completions(completions::CompletionsArgs),
     /// Run the whole chain on the data that comes with the program
     Demo(demo::DemoArgs),
     /// Find the board's corners in a dataset's images: corners.csv
@@ -72,6 +74,8 @@ pub enum Verb {
     Import(import::ImportArgs),
     /// Say what a dataset, a calibration or a blob is
     Inspect(inspect::InspectArgs),
+    /// Write the manual pages
+    Man(man::ManArgs),
     /// Triangulate matches
     Measure(measure::MeasureArgs),
     /// Compare the ray field with a pinhole on the same boards

@@ -6,7 +6,7 @@ use super::error::Error;
 use super::lengths::{self, check_lengths};
 use super::match_noise::{in_f32, parse};
 use super::output::Console;
-use super::place::check_file;
+use super::place::{check_file, place_in_words};
 use super::rig_file::{RigFile, open};
 use super::usage_error::UsageError;
 use crate::device::{DeviceSource, connect};
@@ -403,7 +403,7 @@ fn in_words(object: &MeasureObject<'_>) -> String {
     format!(
         "{}; written to {}{}",
         parts.join(", "),
-        object.output.display(),
+        place_in_words(object.output),
         object
             .known_lengths
             .as_ref()
