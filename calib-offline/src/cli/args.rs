@@ -3,7 +3,7 @@
 use super::settings::CommonArgs;
 use super::{
     audit, calibrate, compare, completions, demo, detect, device, evaluate, export, flash, import,
-    inspect, man, measure, methods, pack, rays, simulate, target, verify,
+    inspect, man, measure, methods, pack, rays, report, simulate, target, verify,
 };
 use clap::{Parser, Subcommand};
 
@@ -84,6 +84,8 @@ pub enum Verb {
     Pack(pack::PackArgs),
     /// Look up the rays of single pixels
     Rays(rays::RaysArgs),
+    /// Draw the page of a calibration again, without its recording
+    Report(report::ReportArgs),
     /// Make a dataset with known truth
     #[command(before_help = SIMULATE_EXAMPLE, after_help = SIMULATE_FORMATS)]
     Simulate(simulate::SimulateArgs),

@@ -42,6 +42,7 @@ pub mod place;
 pub mod progress;
 pub mod rays;
 mod recording;
+pub mod report;
 mod rig_file;
 mod run;
 pub mod settings;

@@ -7,7 +7,7 @@ use super::output::Console;
 use super::settings::Settings;
 use super::{
     audit, calibrate, compare, completions, demo, device, evaluate, export, failure, flash, import,
-    inspect, man, measure, methods, pack, rays, recording, target, verify,
+    inspect, man, measure, methods, pack, rays, recording, report, target, verify,
 };
 use super::usage_error::UsageError;
 use calib_recording::atomic_file::{WriteError, is_standard_output};
@@ -87,6 +87,7 @@ fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
         Verb::Methods(args) => methods::run(args, console),
         Verb::Pack(args) => pack::run(args, console),
         Verb::Rays(args) => rays::run(args, console),
+        Verb::Report(args) => report::run(args, console),
         Verb::Simulate(args) => recording::simulate(args, console),
         Verb::Target(args) => target::run(args, console),
         Verb::Verify(args) => verify::run(args, console),

@@ -29,6 +29,7 @@ mod model_choice;
 mod point_sigma;
 mod printed_targets;
 mod rays_command;
+mod report_command;
 mod schemas;
 mod standard_output;
 mod starting_points;
