@@ -1,8 +1,8 @@
-//! Files are written whole or not at all: first beside their place, then renamed into it.
+//! Files are written whole or not at all: first beside their place, then renamed into it. The place "-" is standard output.
 
 use calib_rays::remedy::Remedy;
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Stdout, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
@@ -30,6 +30,9 @@ pub enum WriteError {
         /// The place.
         path: PathBuf,
     },
+    /// Several files were to be written to standard output.
+    #[error("- is standard output, and several files are to be written")]
+    NoFolderOnStandardOutput,
     /// The system refused.
     #[error("{}: cannot be written", path.display())]
     Io {
@@ -46,6 +49,7 @@ impl Remedy for WriteError {
             Self::IsFolder { .. } => "name a file inside the folder",
             Self::NoFolder { .. } => "make the folder first, or choose another place",
             Self::NotFolder { .. } => "choose another place; nothing was replaced",
+            Self::NoFolderOnStandardOutput => "name a folder; one called - is ./-",
             Self::Io { .. } => "check the permissions and the space left; nothing was written",
         };
         Some(text.to_owned())
@@ -65,6 +69,21 @@ enum Target {
     Beside(BufWriter<NamedTempFile>),
     /// A device or a pipe has no "beside" and must not be replaced by a file.
     Direct(BufWriter<File>),
+    /// Whose reader may go away before the end.
+    Standard(BufWriter<Stdout>),
+}
+
+/// Whether a place is standard output.
+pub fn is_standard_output(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+/// A reader of standard output that has read enough is no error.
+fn unless_reader_left<T>(outcome: io::Result<T>, done: T) -> io::Result<T> {
+    match outcome {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(done),
+        outcome => outcome,
+    }
 }
 
 impl PendingFile {
@@ -77,6 +96,12 @@ impl PendingFile {
             path: path.to_owned(),
             source,
         };
+        if is_standard_output(path) {
+            return Ok(Self {
+                path: path.to_owned(),
+                target: Target::Standard(BufWriter::with_capacity(1 << 16, io::stdout())),
+            });
+        }
         check_place(path)?;
         let target = match fs::metadata(path) {
             Ok(found) if !found.is_file() => {
@@ -120,6 +145,9 @@ impl PendingFile {
         };
         match self.target {
             Target::Direct(mut writer) => writer.flush().map_err(io_error),
+            Target::Standard(mut writer) => {
+                unless_reader_left(writer.flush(), ()).map_err(io_error)
+            }
             Target::Beside(writer) => {
                 let file = writer
                     .into_inner()
@@ -138,6 +166,7 @@ impl Write for PendingFile {
         match &mut self.target {
             Target::Beside(writer) => writer.write(buffer),
             Target::Direct(writer) => writer.write(buffer),
+            Target::Standard(writer) => unless_reader_left(writer.write(buffer), buffer.len()),
         }
     }
 
@@ -145,6 +174,7 @@ impl Write for PendingFile {
         match &mut self.target {
             Target::Beside(writer) => writer.flush(),
             Target::Direct(writer) => writer.flush(),
+            Target::Standard(writer) => unless_reader_left(writer.flush(), ()),
         }
     }
 }
@@ -181,6 +211,9 @@ pub fn write_set(files: &[(PathBuf, &[u8])]) -> Result<(), WriteError> {
 /// # Errors
 /// [`WriteError::IsFolder`], [`WriteError::NoFolder`], [`WriteError::NotFolder`].
 pub fn check_place(path: &Path) -> Result<(), WriteError> {
+    if is_standard_output(path) {
+        return Ok(());
+    }
     if path.is_dir() {
         return Err(WriteError::IsFolder {
             path: path.to_owned(),
@@ -205,8 +238,11 @@ pub fn check_place(path: &Path) -> Result<(), WriteError> {
 /// Whether `path` is a folder or could be made one.
 ///
 /// # Errors
-/// [`WriteError::NotFolder`] if it, or anything it would lie in, is a file.
+/// [`WriteError::NotFolder`] if it, or anything it would lie in, is a file; [`WriteError::NoFolderOnStandardOutput`].
 pub fn check_folder(path: &Path) -> Result<(), WriteError> {
+    if is_standard_output(path) {
+        return Err(WriteError::NoFolderOnStandardOutput);
+    }
     let standing = path
         .ancestors()
         .map(|p| {

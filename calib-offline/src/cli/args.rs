@@ -2,8 +2,8 @@
 
 use super::settings::CommonArgs;
 use super::{
-    audit, calibrate, compare, demo, detect, device, evaluate, export, flash, import, inspect,
-    keygen, measure, methods, pack, rays, sign, simulate, target, verify,
+    audit, calibrate, compare, completions, demo, detect, device, evaluate, export, flash, import,
+    inspect, keygen, man, measure, methods, pack, rays, report, sign, simulate, target, verify,
 };
 use clap::{Parser, Subcommand};
 
@@ -56,6 +56,8 @@ pub enum Verb {
     Calibrate(calibrate::CalibrateArgs),
     /// Compare two calibrations of one rig: their difference, beside the predicted one
     Compare(compare::CompareArgs),
+    /// Print what a shell needs to complete commands
+    Completions(completions::CompletionsArgs),
     /// Run the whole chain on the data that comes with the program
     Demo(demo::DemoArgs),
     /// Find the board's corners in a dataset's images: corners.csv
@@ -74,6 +76,8 @@ pub enum Verb {
     Inspect(inspect::InspectArgs),
     /// Make a key for the owner of devices
     Keygen(keygen::KeygenArgs),
+    /// Write the manual pages
+    Man(man::ManArgs),
     /// Triangulate matches
     Measure(measure::MeasureArgs),
     /// Compare the ray field with a pinhole on the same boards
@@ -84,6 +88,8 @@ pub enum Verb {
     Rays(rays::RaysArgs),
     /// Sign a blob for devices that have an owner
     Sign(sign::SignArgs),
+    /// Draw the page of a calibration again, without its recording
+    Report(report::ReportArgs),
     /// Make a dataset with known truth
     #[command(before_help = SIMULATE_EXAMPLE, after_help = SIMULATE_FORMATS)]
     Simulate(simulate::SimulateArgs),

@@ -11,7 +11,7 @@ use super::export_mesh::{self, MeshArgs, MeshLoss};
 use super::export_options::FolderArgs;
 use super::export_slot::{self, SlotArgs, SlotObject};
 use super::output::Console;
-use super::place::check_file;
+use super::place::{check_file, place_in_words};
 use super::rig_file::{RigFile, open};
 use super::usage_error::UsageError;
 use calib_blob::export::{self, ExportError, Form};
@@ -314,7 +314,7 @@ fn write_points(args: &ExportArgs, console: &Console) -> Result<Outcome, Error> 
         "{} points{sigma}, {} rows without one left out; written to {}",
         cloud.count,
         cloud.left_out,
-        args.output.display()
+        place_in_words(&args.output)
     );
     console.result(&words, &object);
     Ok(Outcome::Done)
@@ -361,7 +361,7 @@ fn write_file(args: &ExportArgs, start: &[u8], console: &Console) -> Result<Outc
     let mut words = format!(
         "a blob of {} bytes{place}; written to {}",
         bytes.len(),
-        args.output.display()
+        place_in_words(&args.output)
     );
     for note in export_blob::notes(&form, bytes.len()) {
         words += "; ";

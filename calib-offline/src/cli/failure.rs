@@ -77,6 +77,7 @@ pub(super) fn of_arguments(
             narration: Narration::Errors,
             color: false,
             bars: false,
+            file_on_stdout: false,
         });
         let object = ErrorObject {
             schema: SCHEMA,

@@ -5,7 +5,7 @@ use super::error::Error;
 use super::foreign_args::ForeignArgs;
 use super::import_corners::{self, CornerArgs};
 use super::output::Console;
-use super::place::check_file;
+use super::place::{check_file, place_in_words};
 use super::usage_error::UsageError;
 use crate::report::facts::Facts;
 use crate::report::import::{record, summary};
@@ -136,7 +136,7 @@ pub fn run(args: &ImportArgs, console: &Console) -> Result<Outcome, Error> {
         let words = format!(
             "{}written to {}",
             summary(imported, &Facts::of(&calibration)),
-            args.output.display()
+            place_in_words(&args.output)
         );
         console.result(&words, &object);
     }

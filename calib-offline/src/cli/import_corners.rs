@@ -2,7 +2,7 @@
 
 use super::error::Error;
 use super::output::Console;
-use super::place::check_file;
+use super::place::{check_file, place_in_words};
 use super::usage_error::UsageError;
 use calib_exchange::corners::columns::{self, Columns};
 use calib_exchange::corners::vnl::{self, Images};
@@ -87,7 +87,7 @@ pub(super) fn run(
         object.corners,
         object.poses,
         object.cameras.join(", "),
-        output.display()
+        place_in_words(output)
     );
     console.result(&words, &object);
     Ok(())

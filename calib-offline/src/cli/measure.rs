@@ -7,7 +7,7 @@ use super::lengths::{self, check_lengths};
 use super::match_noise::{in_f32, parse};
 use super::output::Console;
 use super::pack::ArithmeticArg;
-use super::place::check_file;
+use super::place::{check_file, place_in_words};
 use super::rig_file::{RigFile, open};
 use super::usage_error::UsageError;
 use crate::device::{DeviceSource, connect};
@@ -438,7 +438,7 @@ fn in_words(object: &MeasureObject<'_>) -> String {
     format!(
         "{}; written to {}{}",
         parts.join(", "),
-        object.output.display(),
+        place_in_words(object.output),
         object
             .known_lengths
             .as_ref()

@@ -5,13 +5,16 @@ use super::progress::Bars;
 use super::settings::{Narration, Settings};
 use calib_rays::progress::Progress;
 use serde::Serialize;
-use std::io::Write;
+use std::cell::RefCell;
+use std::io::{ErrorKind, Write};
 
 /// Where a command shows what it does and finds.
 #[derive(Debug)]
 pub struct Console {
     settings: Settings,
     bars: Bars,
+    /// What happened to a result that could not be written.
+    lost: RefCell<Option<std::io::Error>>,
 }
 
 impl Console {
@@ -20,6 +23,7 @@ impl Console {
         Self {
             settings,
             bars: Bars::new(settings),
+            lost: RefCell::new(None),
         }
     }
 
@@ -62,7 +66,8 @@ impl Console {
         });
     }
 
-    /// The result: `words` for people, or `object` with `--json`.
+    /// The result: `words` for people, or `object` with `--json`. Where the command's file itself goes to standard
+    /// output, the words are narration.
     pub fn result(&self, words: &str, object: &impl Serialize) {
         let text = if self.settings.json {
             // The objects are our own structs of strings and numbers.
@@ -71,8 +76,21 @@ impl Console {
             words.to_owned()
         };
         let text = text.trim_end_matches('\n');
+        if self.settings.file_on_stdout {
+            return self.narrate(text);
+        }
         let mut stdout = std::io::stdout().lock();
-        let _ = writeln!(stdout, "{text}").and_then(|()| stdout.flush());
+        let written = writeln!(stdout, "{text}").and_then(|()| stdout.flush());
+        if let Err(error) = written
+            && error.kind() != ErrorKind::BrokenPipe
+        {
+            *self.lost.borrow_mut() = Some(error);
+        }
+    }
+
+    /// Why a result did not reach standard output, if one did not.
+    pub fn take_lost(&self) -> Option<std::io::Error> {
+        self.lost.take()
     }
 
     /// The word in a color, if colors are shown.

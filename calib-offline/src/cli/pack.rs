@@ -5,7 +5,7 @@ use super::calibrate::{blob_max_error_px, pack_settings, watched};
 use super::error::Error;
 use super::match_noise::parse;
 use super::output::Console;
-use super::place::check_file;
+use super::place::{check_file, place_in_words};
 use crate::present::numbers::short;
 use crate::report::{BlobFacts, Calibration};
 use calib_blob::pack::{CurvePoint, Deviation, LOOSEST_PX, PackSettings, Prefer};
@@ -219,7 +219,7 @@ pub fn run(args: &PackArgs, console: &Console) -> Result<Outcome, Error> {
         object.bytes,
         short(object.worst_error_px),
         short(object.worst_error_mm),
-        args.output.display()
+        place_in_words(&args.output)
     );
     console.result(&words, &object);
     Ok(Outcome::Done)

@@ -6,7 +6,8 @@
 
 use super::error::Error;
 use super::usage_error::UsageError;
-use calib_recording::atomic_file::{check_place, check_writable};
+use calib_recording::atomic_file::{check_place, check_writable, is_standard_output};
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -23,6 +24,9 @@ pub fn check_file(
     force: bool,
 ) -> Result<(), Error> {
     check_place(path)?;
+    if is_standard_output(path) {
+        return Ok(());
+    }
     if let Ok(place) = path.canonicalize()
         && inputs
             .iter()
@@ -38,6 +42,15 @@ pub fn check_file(
     Err(Error::Usage(UsageError::Exists {
         path: path.to_owned(),
     }))
+}
+
+/// A place in words.
+pub fn place_in_words(path: &Path) -> Cow<'_, str> {
+    if is_standard_output(path) {
+        "standard output".into()
+    } else {
+        path.to_string_lossy()
+    }
 }
 
 /// Refuses a folder for several files: a file in its place, no permission to write there, or any

@@ -4,7 +4,7 @@ use super::Outcome;
 use super::error::Error;
 use super::measure::open_matches;
 use super::output::Console;
-use super::place::check_file;
+use super::place::{check_file, place_in_words};
 use super::rig_file::{RigFile, open};
 use super::usage_error::UsageError;
 use calib_blob::matches::{PixelsError, RAYS_HEADER, RaysSummary, StreamError, rays_of_pixels};
@@ -90,7 +90,7 @@ pub fn run(args: &RaysArgs, console: &Console) -> Result<Outcome, Error> {
         "{} of {} pixels have a ray{outside}; written to {}",
         summary.ok,
         summary.pixels,
-        args.output.display()
+        place_in_words(&args.output)
     );
     console.result(&words, &object);
     Ok(Outcome::Done)

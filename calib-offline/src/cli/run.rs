@@ -5,11 +5,14 @@ use super::error::Error;
 use super::outcome::Outcome;
 use super::output::Console;
 use super::settings::Settings;
+use super::usage_error::UsageError;
 use super::{
-    audit, calibrate, compare, demo, device, evaluate, export, failure, flash, import, inspect,
-    keygen, measure, methods, pack, rays, recording, sign, target, verify,
+    audit, calibrate, compare, completions, demo, device, evaluate, export, failure, flash, import,
+    inspect, keygen, man, measure, methods, pack, rays, recording, report, sign, target, verify,
 };
-use clap::{Command, CommandFactory as _, FromArgMatches as _};
+use calib_recording::atomic_file::{WriteError, is_standard_output};
+use clap::{ArgMatches, Command, CommandFactory as _, FromArgMatches as _};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// The command with options that take a number below zero as their value, and no option of its own: what is wrong with
@@ -26,23 +29,43 @@ fn with_negative_numbers(command: Command) -> Command {
 pub fn main() -> ExitCode {
     let parsed = with_negative_numbers(Cli::command())
         .try_get_matches()
-        .and_then(|matches| Cli::from_arg_matches(&matches));
-    let cli = match parsed {
-        Ok(cli) => cli,
+        .and_then(|matches| Ok((Cli::from_arg_matches(&matches)?, writes_to_stdout(&matches))));
+    let (cli, file_on_stdout) = match parsed {
+        Ok(parsed) => parsed,
         Err(error) => return failure::of_arguments(&error, std::env::args_os()),
     };
-    let console = Console::new(Settings::resolve(&cli.common));
+    let is_one_too_many = file_on_stdout && cli.common.json;
+    let settings = Settings::resolve(&cli.common, file_on_stdout && !is_one_too_many);
+    let console = Console::new(settings);
+    if is_one_too_many {
+        let error = Error::Usage(UsageError::TwoOnStandardOutput);
+        return failure::of_command(&error, &console);
+    }
     if let Some(threads) = cli.common.threads {
         // Fails only if the pool exists already; then it has the threads it has.
         let _ = rayon::ThreadPoolBuilder::new()
             .num_threads(threads.get())
             .build_global();
     }
-    match run(&cli.verb, &console) {
+    let code = match run(&cli.verb, &console) {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::VerdictFail) => ExitCode::from(1),
         Err(error) => failure::of_command(&error, &console),
-    }
+    };
+    console.take_lost().map_or(code, |source| {
+        let path = PathBuf::from("standard output");
+        failure::of_command(&Error::Write(WriteError::Io { path, source }), &console)
+    })
+}
+
+/// Whether the verb's own file goes to standard output.
+fn writes_to_stdout(matches: &ArgMatches) -> bool {
+    let Some((_, verb)) = matches.subcommand() else {
+        return false;
+    };
+    // Not every verb has an output.
+    let output = verb.try_get_one::<PathBuf>("output");
+    output.is_ok_and(|output| output.is_some_and(|output| is_standard_output(output)))
 }
 
 fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
@@ -50,6 +73,7 @@ fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
         Verb::Audit(args) => audit::run(args, console),
         Verb::Calibrate(args) => calibrate::run(args, console, &crate::pipeline::calibrate),
         Verb::Compare(args) => compare::run(args, console),
+        Verb::Completions(args) => Ok(completions::run(args, console)),
         Verb::Demo(args) => demo::run(args, console),
         Verb::Detect(args) => recording::detect(args, console),
         Verb::Device(args) => device::run(args, console),
@@ -59,11 +83,13 @@ fn run(verb: &Verb, console: &Console) -> Result<Outcome, Error> {
         Verb::Import(args) => import::run(args, console),
         Verb::Inspect(args) => inspect::run(args, console),
         Verb::Keygen(args) => keygen::run(args, console),
+        Verb::Man(args) => man::run(args, console),
         Verb::Measure(args) => measure::run(args, console),
         Verb::Methods(args) => methods::run(args, console),
         Verb::Pack(args) => pack::run(args, console),
         Verb::Rays(args) => rays::run(args, console),
         Verb::Sign(args) => sign::run(args, console),
+        Verb::Report(args) => report::run(args, console),
         Verb::Simulate(args) => recording::simulate(args, console),
         Verb::Target(args) => target::run(args, console),
         Verb::Verify(args) => verify::run(args, console),

@@ -53,6 +53,8 @@ pub struct Settings {
     pub color: bool,
     /// Whether standard error is a terminal that can show moving bars.
     pub bars: bool,
+    /// Whether the command's file itself goes to standard output, so that its words go elsewhere.
+    pub file_on_stdout: bool,
 }
 
 /// How much is said on standard error.
@@ -67,12 +69,15 @@ pub enum Narration {
 }
 
 impl Settings {
-    /// The settings of this process.
-    pub fn resolve(common: &CommonArgs) -> Self {
+    /// The settings of this process; `file_on_stdout` as of the field.
+    pub fn resolve(common: &CommonArgs, file_on_stdout: bool) -> Self {
         let terminal = std::io::stderr().is_terminal();
         let set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
         let dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
-        Self::from_facts(common, terminal && !dumb, set("NO_COLOR"))
+        Self {
+            file_on_stdout,
+            ..Self::from_facts(common, terminal && !dumb, set("NO_COLOR"))
+        }
     }
 
     fn from_facts(common: &CommonArgs, terminal: bool, no_color: bool) -> Self {
@@ -90,6 +95,7 @@ impl Settings {
                 ColorChoice::Auto => terminal && !no_color,
             },
             bars: terminal && narration > Narration::Errors,
+            file_on_stdout: false,
         }
     }
 }

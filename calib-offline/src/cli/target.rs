@@ -3,11 +3,11 @@
 use super::Outcome;
 use super::error::Error;
 use super::output::Console;
-use super::place::check_file;
+use super::place::{check_file, place_in_words};
 use super::usage_error::UsageError;
 use calib_rays::board::BoardSpec;
 use calib_rays::print::{Artwork, TagOrder, chessboard, pdf, rings, svg};
-use calib_recording::atomic_file;
+use calib_recording::atomic_file::{self, is_standard_output};
 use calib_recording::dataset::BoardKind;
 use calib_recording::dataset::manifest::read_board;
 use clap::Args;
@@ -121,7 +121,7 @@ pub struct TargetArgs {
 struct TargetObject<'a> {
     schema: &'static str,
     output: &'a Path,
-    board_file: &'a Path,
+    board_file: Option<&'a Path>,
     kind: &'static str,
     width_mm: f64,
     height_mm: f64,
@@ -143,6 +143,7 @@ pub fn run(args: &TargetArgs, console: &Console) -> Result<Outcome, Error> {
     let form = match args.output.extension().and_then(|ending| ending.to_str()) {
         Some("svg") => Form::Svg,
         Some("pdf") => Form::Pdf,
+        _ if is_standard_output(&args.output) => Form::Svg,
         _ => {
             return Err(Error::Usage(UsageError::UnknownKind {
                 path: args.output.clone(),
@@ -156,9 +157,13 @@ pub fn run(args: &TargetArgs, console: &Console) -> Result<Outcome, Error> {
         Form::Pdf => b"%PDF",
     };
     check_file(&args.output, start, &[], args.force)?;
-    check_file(&board_file, b"[board]", &[], args.force)?;
+    // The print has it, too.
+    let board_file = (!is_standard_output(&args.output)).then_some(board_file);
+    if let Some(board_file) = &board_file {
+        check_file(board_file, b"[board]", &[], args.force)?;
+    }
     let text = board_text(args);
-    let (kind, board) = read_board(&text, &board_file)?;
+    let (kind, board) = read_board(&text, board_file.as_deref().unwrap_or(&args.output))?;
     let Some(art) = artwork(&kind, &board) else {
         return Err(Error::Usage(UsageError::NothingToPrint {
             kind: kind.word(),
@@ -169,23 +174,27 @@ pub fn run(args: &TargetArgs, console: &Console) -> Result<Outcome, Error> {
         Form::Pdf => pdf::document(&art),
     };
     atomic_file::write(&args.output, &file)?;
-    atomic_file::write(&board_file, text.as_bytes())?;
+    if let Some(board_file) = &board_file {
+        atomic_file::write(board_file, text.as_bytes())?;
+    }
     let [left, right, upper, lower] = art.plate_mm;
     let object = TargetObject {
         schema: "calib-offline/target/1",
         output: &args.output,
-        board_file: &board_file,
+        board_file: board_file.as_deref(),
         kind: kind.word(),
         width_mm: right - left,
         height_mm: lower - upper,
         board: &text,
     };
+    let board_place = object.board_file.map_or(String::new(), |file| {
+        format!("; its [board] to {}", file.display())
+    });
     console.narrate(&format!(
-        "{} x {} mm, written to {}; its [board] to {}",
+        "{} x {} mm, written to {}{board_place}",
         svg::number(object.width_mm),
         svg::number(object.height_mm),
-        args.output.display(),
-        board_file.display()
+        place_in_words(&args.output),
     ));
     console.result(&text, &object);
     Ok(Outcome::Done)

@@ -17,6 +17,9 @@ pub enum UsageError {
         /// The file.
         path: PathBuf,
     },
+    /// A file and an object that would both be standard output.
+    #[error("-o - and --json: standard output cannot be the file and the object")]
+    TwoOnStandardOutput,
     /// A file that is neither of the kinds that the command reads.
     #[error("{}: is not {expected}", path.display())]
     UnknownKind {
@@ -211,6 +214,7 @@ pub enum UsageError {
 impl Remedy for UsageError {
     fn remedy(&self) -> Option<String> {
         let text = match self {
+            Self::TwoOnStandardOutput => "leave --json out, or name a file",
             Self::Exists { .. } => "choose another place, or replace it with --force",
             Self::UnknownKind { .. } | Self::NotFound { .. } => "check the path",
             Self::SlotImageLacks { .. } => {

@@ -11,6 +11,7 @@ fn console() -> Console {
         narration: Narration::Errors,
         color: false,
         bars: false,
+        file_on_stdout: false,
     })
 }
 
