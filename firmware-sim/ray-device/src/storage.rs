@@ -21,103 +21,38 @@
 //! # Which flash
 //! Units of 1 to 512 bytes, blocks that are a power of two of at least 64. Anything else does not compile:
 //! ```
-//! # use ray_device::port::{Flash, Geometry};
-//! # use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
-//! # struct Part<const UNIT: usize, const BLOCK: usize>;
-//! # impl<const U: usize, const B: usize> ErrorType for Part<U, B> { type Error = NorFlashErrorKind; }
-//! # impl<const U: usize, const B: usize> ReadNorFlash for Part<U, B> {
-//! #     const READ_SIZE: usize = 1;
-//! #     fn read(&mut self, _: u32, _: &mut [u8]) -> Result<(), NorFlashErrorKind> { Ok(()) }
-//! #     fn capacity(&self) -> usize { 1 << 20 }
-//! # }
-//! # impl<const U: usize, const B: usize> NorFlash for Part<U, B> {
-//! #     const WRITE_SIZE: usize = U;
-//! #     const ERASE_SIZE: usize = B;
-//! #     fn erase(&mut self, _: u32, _: u32) -> Result<(), NorFlashErrorKind> { Ok(()) }
-//! #     fn write(&mut self, _: u32, _: &[u8]) -> Result<(), NorFlashErrorKind> { Ok(()) }
-//! # }
-//! # impl<const U: usize, const B: usize> Flash for Part<U, B> {}
+//! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/storage/any_part.rs"));
+//! # fn main() {
 //! ray_device::storage::require_supported::<Part<512, 512>>();
+//! # }
 //! ```
 //! A unit of 1024 bytes:
 //! ```compile_fail
-//! # use ray_device::port::{Flash, Geometry};
-//! # use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
-//! # struct Part<const UNIT: usize, const BLOCK: usize>;
-//! # impl<const U: usize, const B: usize> ErrorType for Part<U, B> { type Error = NorFlashErrorKind; }
-//! # impl<const U: usize, const B: usize> ReadNorFlash for Part<U, B> {
-//! #     const READ_SIZE: usize = 1;
-//! #     fn read(&mut self, _: u32, _: &mut [u8]) -> Result<(), NorFlashErrorKind> { Ok(()) }
-//! #     fn capacity(&self) -> usize { 1 << 20 }
-//! # }
-//! # impl<const U: usize, const B: usize> NorFlash for Part<U, B> {
-//! #     const WRITE_SIZE: usize = U;
-//! #     const ERASE_SIZE: usize = B;
-//! #     fn erase(&mut self, _: u32, _: u32) -> Result<(), NorFlashErrorKind> { Ok(()) }
-//! #     fn write(&mut self, _: u32, _: &[u8]) -> Result<(), NorFlashErrorKind> { Ok(()) }
-//! # }
-//! # impl<const U: usize, const B: usize> Flash for Part<U, B> {}
+//! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/storage/any_part.rs"));
+//! # fn main() {
 //! ray_device::storage::require_supported::<Part<1024, 4096>>();
+//! # }
 //! ```
 //! A unit of 24 bytes:
 //! ```compile_fail
-//! # use ray_device::port::{Flash, Geometry};
-//! # use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
-//! # struct Part<const UNIT: usize, const BLOCK: usize>;
-//! # impl<const U: usize, const B: usize> ErrorType for Part<U, B> { type Error = NorFlashErrorKind; }
-//! # impl<const U: usize, const B: usize> ReadNorFlash for Part<U, B> {
-//! #     const READ_SIZE: usize = 1;
-//! #     fn read(&mut self, _: u32, _: &mut [u8]) -> Result<(), NorFlashErrorKind> { Ok(()) }
-//! #     fn capacity(&self) -> usize { 1 << 20 }
-//! # }
-//! # impl<const U: usize, const B: usize> NorFlash for Part<U, B> {
-//! #     const WRITE_SIZE: usize = U;
-//! #     const ERASE_SIZE: usize = B;
-//! #     fn erase(&mut self, _: u32, _: u32) -> Result<(), NorFlashErrorKind> { Ok(()) }
-//! #     fn write(&mut self, _: u32, _: &[u8]) -> Result<(), NorFlashErrorKind> { Ok(()) }
-//! # }
-//! # impl<const U: usize, const B: usize> Flash for Part<U, B> {}
+//! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/storage/any_part.rs"));
+//! # fn main() {
 //! ray_device::storage::require_supported::<Part<24, 4096>>();
+//! # }
 //! ```
 //! A block smaller than the unit:
 //! ```compile_fail
-//! # use ray_device::port::{Flash, Geometry};
-//! # use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
-//! # struct Part<const UNIT: usize, const BLOCK: usize>;
-//! # impl<const U: usize, const B: usize> ErrorType for Part<U, B> { type Error = NorFlashErrorKind; }
-//! # impl<const U: usize, const B: usize> ReadNorFlash for Part<U, B> {
-//! #     const READ_SIZE: usize = 1;
-//! #     fn read(&mut self, _: u32, _: &mut [u8]) -> Result<(), NorFlashErrorKind> { Ok(()) }
-//! #     fn capacity(&self) -> usize { 1 << 20 }
-//! # }
-//! # impl<const U: usize, const B: usize> NorFlash for Part<U, B> {
-//! #     const WRITE_SIZE: usize = U;
-//! #     const ERASE_SIZE: usize = B;
-//! #     fn erase(&mut self, _: u32, _: u32) -> Result<(), NorFlashErrorKind> { Ok(()) }
-//! #     fn write(&mut self, _: u32, _: &[u8]) -> Result<(), NorFlashErrorKind> { Ok(()) }
-//! # }
-//! # impl<const U: usize, const B: usize> Flash for Part<U, B> {}
+//! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/storage/any_part.rs"));
+//! # fn main() {
 //! ray_device::storage::require_supported::<Part<512, 256>>();
+//! # }
 //! ```
 //! A block of 1000 bytes:
 //! ```compile_fail
-//! # use ray_device::port::{Flash, Geometry};
-//! # use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
-//! # struct Part<const UNIT: usize, const BLOCK: usize>;
-//! # impl<const U: usize, const B: usize> ErrorType for Part<U, B> { type Error = NorFlashErrorKind; }
-//! # impl<const U: usize, const B: usize> ReadNorFlash for Part<U, B> {
-//! #     const READ_SIZE: usize = 1;
-//! #     fn read(&mut self, _: u32, _: &mut [u8]) -> Result<(), NorFlashErrorKind> { Ok(()) }
-//! #     fn capacity(&self) -> usize { 1 << 20 }
-//! # }
-//! # impl<const U: usize, const B: usize> NorFlash for Part<U, B> {
-//! #     const WRITE_SIZE: usize = U;
-//! #     const ERASE_SIZE: usize = B;
-//! #     fn erase(&mut self, _: u32, _: u32) -> Result<(), NorFlashErrorKind> { Ok(()) }
-//! #     fn write(&mut self, _: u32, _: &[u8]) -> Result<(), NorFlashErrorKind> { Ok(()) }
-//! # }
-//! # impl<const U: usize, const B: usize> Flash for Part<U, B> {}
+//! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/storage/any_part.rs"));
+//! # fn main() {
 //! ray_device::storage::require_supported::<Part<8, 1000>>();
+//! # }
 //! ```
 
 pub mod access;
