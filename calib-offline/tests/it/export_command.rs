@@ -143,10 +143,10 @@ fn an_image_of_a_slot_is_written_in_every_container() {
         (fs::read(path.join("slot.out")).unwrap(), run.json())
     };
     let (bin, object) = written(&["--container", "bin"]);
-    // Behind the factory's block, a log in a quarter of the first block, then the blob.
+    // Behind the factory's block, a log of 256 entries of 96 bytes, then the blob.
     assert_eq!(object["base_address"], 0x0814_0000);
-    assert_eq!(object["slot"]["blob_address"], 0x0814_8000);
-    assert_eq!(bin[0x8000..][..blob.len()], blob);
+    assert_eq!(object["slot"]["blob_address"], 0x0814_6000);
+    assert_eq!(bin[0x6000..][..blob.len()], blob);
     assert!(bin.starts_with(b"RayD"));
     let (hex, object) = written(&["--slot", "1"]);
     assert!(hex.starts_with(b":02000004081AD8\n:10000000526179"));

@@ -72,11 +72,14 @@ fn from_a_recording_to_points() {
     let mesh = ["export", "new.rays", "-o", "ldc", "--format", "mesh-ti"];
     let table = "id,x,y,z,gap,sigma_x,sigma_y,sigma_z,status\na,1,2,3,0,,,,ok\n";
     fs::write(path.join("table.csv"), table).unwrap();
+    let slot = "export new.rays -o slot.hex --format slot-image --part rp2040 --region-address 0x10100000 --region-size 0x40000";
+    let slot: Vec<&str> = slot.split(' ').collect();
     let clouds = ["export", "table.csv", "-o", "cloud.ply", "--format", "ply"];
     let exported = [
         exported,
         json(path, &export),
         json(path, &mesh),
+        json(path, &slot),
         json(path, &clouds),
     ];
     assert_documented("export", "calib-offline/export/1", &exported, &[]);
