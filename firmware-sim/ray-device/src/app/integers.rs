@@ -3,7 +3,7 @@
 use ray_runtime::integer::{self, Unsuited};
 use ray_runtime::{MeasureError, RayBlob};
 
-use super::sightings;
+use super::measure::sightings;
 use crate::protocol::{
     Arithmetic, MAX_CAMERAS_LISTED, Match, Measured, Point, Refusal, SelfTestReport,
 };

@@ -1,11 +1,9 @@
 //! Why a frame or a request was refused: facts on the wire, words and the next step in `Display`.
 
 use ray_runtime::MatchNoise;
-
-use crate::storage::trust::Distrust;
 use serde::{Deserialize, Serialize};
 
-use crate::storage::OTHER_PART;
+use super::unusable::{Distrust, OTHER_PART};
 
 /// Why a frame or a request was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -172,6 +170,21 @@ pub enum FlashOperation {
     Erase,
     /// Programming a unit, or it reads otherwise afterwards.
     Program,
+}
+
+impl Distrust {
+    /// The one that a refusal of [`Keys::check_stored`](crate::storage::trust::Keys::check_stored) stands for.
+    pub const fn of(refusal: Refusal) -> Self {
+        match refusal {
+            Refusal::NotSigned => Self::NotSigned,
+            Refusal::BadManifest { .. } => Self::BadManifest,
+            Refusal::OtherManifest => Self::OtherManifest,
+            Refusal::OtherRig { .. } => Self::OtherRig,
+            Refusal::KeyRetired { .. } => Self::KeyRetired,
+            Refusal::VersionTooOld { .. } => Self::VersionTooOld,
+            _ => Self::BadSignature,
+        }
+    }
 }
 
 impl core::fmt::Display for Refusal {

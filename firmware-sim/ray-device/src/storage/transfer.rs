@@ -8,11 +8,12 @@ use ray_runtime::OpenError;
 use ray_runtime::format::HEADER_LEN;
 
 use super::budget::Budget;
+use super::contents::{open_verified, program_blob, program_manifest, read_blob, stored_checksum};
 use super::log::{Log, erase_log};
 use super::record::Record;
+use super::rig;
 use super::slot::SlotFlash;
 use super::trust::{self, Claims, Trust, Verified};
-use super::{open_verified, program_blob, program_manifest, read_blob, rig, stored_checksum};
 use crate::manifest::{MANIFEST_LENGTH, NO_LINK};
 use crate::port::Clock;
 use crate::protocol::{Chunk, MAX_CHUNK, NewBlob, Refusal, Rig, UpdateStatus};
