@@ -282,7 +282,7 @@ impl<'e, S: SlotFlash, C: Clock> Epoch<'e, S, C> {
     fn measure(&mut self, matches: &[Match], asked: Asked) -> Result<Reply, Refusal> {
         let blob = opened(&self.blob)?;
         #[cfg(feature = "integer")]
-        if let Some(integers) = integers::of(&self.integers)? {
+        if let Some(integers) = integers::of(self.integers.as_ref())? {
             let measured = matches
                 .iter()
                 .map(|asked| integers::measure(integers, asked));
@@ -298,7 +298,7 @@ impl<'e, S: SlotFlash, C: Clock> Epoch<'e, S, C> {
     fn self_test(&self) -> Result<Reply, Refusal> {
         let blob = opened(&self.blob)?;
         #[cfg(feature = "integer")]
-        if let Some(integers) = integers::of(&self.integers)? {
+        if let Some(integers) = integers::of(self.integers.as_ref())? {
             return Ok(Reply::SelfTested(integers::report(integers, blob)));
         }
         Ok(Reply::SelfTested(self_test::report(blob)))

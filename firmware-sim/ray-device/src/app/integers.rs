@@ -21,7 +21,7 @@ pub fn prepared<'a>(
 }
 
 /// What is prepared, if anything is to be.
-pub fn of<'r, 'a>(rig: &'r Option<Result<Rig<'a>, u8>>) -> Result<Option<&'r Rig<'a>>, Refusal> {
+pub fn of<'r, 'a>(rig: Option<&'r Result<Rig<'a>, u8>>) -> Result<Option<&'r Rig<'a>>, Refusal> {
     match rig {
         None => Ok(None),
         Some(Ok(rig)) => Ok(Some(rig)),

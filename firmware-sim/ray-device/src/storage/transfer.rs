@@ -268,12 +268,11 @@ impl Transfer {
     /// an owner, any that was stored, as several peers may be sending.
     fn is_repeat<S: SlotFlash>(&self, slot: &mut S, chunk: &Chunk) -> bool {
         let end = chunk.offset.saturating_add(chunk.bytes.len() as u32);
-        let may_be = match &self.verified {
-            None => chunk.offset == self.last_offset && end == self.received,
-            Some(_) => {
-                let within = chunk.offset & (MAX_CHUNK as u32 - 1);
-                within == 0 && end <= self.received
-            }
+        let may_be = if self.verified.is_some() {
+            let within = chunk.offset & (MAX_CHUNK as u32 - 1);
+            within == 0 && end <= self.received
+        } else {
+            chunk.offset == self.last_offset && end == self.received
         };
         if !may_be || chunk.bytes.is_empty() {
             return false;
