@@ -14,7 +14,7 @@ impl DeviceClient {
     /// They travel in batches, several of which are under way at once.
     ///
     /// # Errors
-    /// [`ClientError`]; [`Refusal::NoBlob`] inside it if the device has nothing to measure with. A
+    /// [`ClientError`]; [`Refusal::NoBlob`](ray_device::protocol::Refusal::NoBlob) inside it if the device has nothing to measure with. A
     /// match that the device cannot triangulate is no error here but an outcome of its own.
     pub fn measure(&mut self, matches: &[Match]) -> Result<Vec<Measured>, ClientError> {
         self.measure_batches(matches, Request::Measure)
@@ -23,7 +23,7 @@ impl DeviceClient {
     /// [`DeviceClient::measure`] of pixels that are as noisy as `noise`, whatever the blob says of them.
     ///
     /// # Errors
-    /// As for `measure`; [`Refusal::UnknownMessage`] inside it if the device is too old for this.
+    /// As for `measure`; [`Refusal::UnknownMessage`](ray_device::protocol::Refusal::UnknownMessage) inside it if the device is too old for this.
     pub fn measure_noisy(
         &mut self,
         matches: &[Match],
@@ -40,7 +40,7 @@ impl DeviceClient {
     /// [`DeviceClient::measure`] of points alone, without their standard deviations: a quarter of the device's work.
     ///
     /// # Errors
-    /// As for `measure`; [`Refusal::UnknownMessage`] inside it if the device is too old for this.
+    /// As for `measure`; [`Refusal::UnknownMessage`](ray_device::protocol::Refusal::UnknownMessage) inside it if the device is too old for this.
     pub fn measure_points(&mut self, matches: &[Match]) -> Result<Vec<Measured>, ClientError> {
         self.measure_batches(matches, Request::MeasurePoints)
     }
