@@ -218,7 +218,7 @@ fn bytes_of_answers() {
     };
     assert_bytes(
         &Reply::Status(without.clone()),
-        &[2, 1, 2, 3, 1, 5, 0, 0, 1, 0, 4, 5, 6, 0, 0, 0],
+        &[2, 1, 2, 3, 1, 5, 0, 0, 1, 0, 4, 5, 6, 0, 0, 0, 0],
     );
     let camera = CameraStatus {
         name: name("l"),
