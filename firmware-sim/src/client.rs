@@ -3,6 +3,7 @@
 mod address;
 mod error;
 mod flash;
+mod measure;
 #[cfg(feature = "serial")]
 mod serial;
 mod transport;
@@ -13,15 +14,12 @@ use std::time::{Duration, Instant};
 
 use ray_device::frame::{DELIMITER, FrameReader, FrameWriter, NO_SEQUENCE, Received, Rejected};
 use ray_device::protocol::{
-    Hello, MAX_MATCHES, Match, Measured, NoisyMatches, Order, Refusal, Reply, Request,
-    SelfTestReport, Status, StoredBlob,
+    Hello, Order, Refusal, Reply, Request, SelfTestReport, Status, StoredBlob,
 };
 
-use ray_runtime::MatchNoise;
+use error::unexpected;
 
 pub use error::ClientError;
-#[cfg(feature = "signed")]
-pub(crate) use flash::ask_blob;
 pub use flash::{Begun, FlashOptions, FlashProgress, Flashed};
 pub use transport::Transport;
 
@@ -194,86 +192,6 @@ impl DeviceClient {
         }
     }
 
-    /// Has the device triangulate `matches`; one answer each, in the same order.
-    ///
-    /// They travel in batches, several of which are under way at once.
-    ///
-    /// # Errors
-    /// [`ClientError`]; [`Refusal::NoBlob`] inside it if the device has nothing to measure with. A
-    /// match that the device cannot triangulate is no error here but an outcome of its own.
-    pub fn measure(&mut self, matches: &[Match]) -> Result<Vec<Measured>, ClientError> {
-        self.measure_batches(matches, Request::Measure)
-    }
-
-    /// [`DeviceClient::measure`] of pixels that are as noisy as `noise`, whatever the blob says of them.
-    ///
-    /// # Errors
-    /// As for `measure`; [`Refusal::UnknownMessage`] inside it if the device is too old for this.
-    pub fn measure_noisy(
-        &mut self,
-        matches: &[Match],
-        noise: MatchNoise,
-    ) -> Result<Vec<Measured>, ClientError> {
-        self.measure_batches(matches, |matches| {
-            Request::MeasureNoisy(NoisyMatches {
-                noise_px: noise.px(),
-                matches,
-            })
-        })
-    }
-
-    /// [`DeviceClient::measure`] of points alone, without their standard deviations: a quarter of the device's work.
-    ///
-    /// # Errors
-    /// As for `measure`; [`Refusal::UnknownMessage`] inside it if the device is too old for this.
-    pub fn measure_points(&mut self, matches: &[Match]) -> Result<Vec<Measured>, ClientError> {
-        self.measure_batches(matches, Request::MeasurePoints)
-    }
-
-    fn measure_batches(
-        &mut self,
-        matches: &[Match],
-        request: impl Fn(heapless::Vec<Match, MAX_MATCHES>) -> Request,
-    ) -> Result<Vec<Measured>, ClientError> {
-        let mut measured = Vec::with_capacity(matches.len());
-        let batch_length = usize::from(self.greeting.max_matches).clamp(1, MAX_MATCHES);
-        let window = self.window();
-        let mut under_way = VecDeque::with_capacity(window);
-        let mut batches = matches.chunks(batch_length);
-        loop {
-            while under_way.len() < window
-                && let Some(batch) = batches.next()
-            {
-                let batch_on_wire = batch.iter().copied().collect();
-                under_way.push_back((self.send(&request(batch_on_wire))?, batch));
-            }
-            let Some((sequence, batch)) = under_way.pop_front() else {
-                break;
-            };
-            let answers = match self.receive(sequence)? {
-                Reply::Measured(answers) => answers,
-                reply => return Err(unexpected("measure", &reply)),
-            };
-            if !answers
-                .iter()
-                .map(|answer| answer.id)
-                .eq(batch.iter().map(|asked| asked.id))
-            {
-                let found = format!(
-                    "{} matches asked, {} answers with other ids",
-                    batch.len(),
-                    answers.len()
-                );
-                return Err(ClientError::BadReply {
-                    asked: "measure",
-                    found,
-                });
-            }
-            measured.extend_from_slice(&answers);
-        }
-        Ok(measured)
-    }
-
     /// The first hello on a link that may still carry the remains of an earlier conversation.
     fn greet(&mut self) -> Result<Hello, ClientError> {
         let sequence = self.send(&Request::Hello)?;
@@ -437,22 +355,5 @@ fn refused(refusal: Refusal) -> ClientError {
             ours: found,
         },
         refusal => ClientError::Refused(refusal),
-    }
-}
-
-fn unexpected(asked: &'static str, reply: &Reply) -> ClientError {
-    let found = match reply {
-        Reply::Refused(_) => "a refusal",
-        Reply::Hello(_) => "an answer to hello",
-        Reply::Status(_) => "an answer to status",
-        Reply::Measured(_) => "an answer to measure",
-        Reply::Receiving { .. } => "an acknowledgement of a blob's bytes",
-        Reply::Active(_) => "an answer to an update",
-        Reply::Aborted => "an answer to the end of an update",
-        Reply::SelfTested(_) => "an answer to the self-test",
-    };
-    ClientError::BadReply {
-        asked,
-        found: found.to_owned(),
     }
 }

@@ -1,6 +1,8 @@
 #![doc = include_str!("../README.md")]
 
 #[cfg(feature = "client")]
+mod ask_blob;
+#[cfg(feature = "client")]
 pub mod client;
 #[cfg(feature = "signed")]
 pub mod owner;

@@ -20,6 +20,8 @@ use ray_device::protocol::{MAX_NAME, Order, name};
 use ray_runtime::OpenError;
 use thiserror::Error;
 
+use crate::ask_blob::ask_blob;
+
 pub use key_file::{KeyError, OwnerKey, public_key, public_pem};
 
 /// What an owner decides about a blob.
@@ -77,8 +79,7 @@ pub enum ManifestError {
 /// # Errors
 /// [`ManifestError`].
 pub fn manifest_of(blob: &[u8], terms: &Terms) -> Result<Manifest, ManifestError> {
-    let identity =
-        crate::client::ask_blob(blob, |blob| *blob.identity()).map_err(ManifestError::NotABlob)?;
+    let identity = ask_blob(blob, |blob| *blob.identity()).map_err(ManifestError::NotABlob)?;
     if terms.version == 0 || terms.least_version > terms.version {
         return Err(ManifestError::Version {
             version: terms.version,

@@ -147,11 +147,11 @@ pub(crate) fn check_sections(bytes: &[u8], start: usize, version: u16) -> Result
 /// What the sections from `start` on, which were checked, say of the arithmetic of integers: as many numbers as the self-tests
 /// of rays and matches ask for.
 #[cfg(feature = "integer")]
-pub(crate) fn check_arithmetic<'a>(
-    bytes: &'a [u8],
+pub(crate) fn check_arithmetic(
+    bytes: &[u8],
     start: usize,
     self_tests: impl Iterator<Item = SelfTest>,
-) -> Result<Option<Arithmetic<'a>>, OpenError> {
+) -> Result<Option<Arithmetic<'_>>, OpenError> {
     let mut at = start;
     for index in 0..MAX_SECTIONS {
         let Some((section, behind)) = bytes.get(at..).and_then(Section::read) else {

@@ -1,9 +1,8 @@
 //! `completions`: what a shell needs to complete verbs, options and files, from the definitions that are parsed by.
 
 use super::Outcome;
-use super::args::Cli;
 use super::output::Console;
-use clap::{Args, CommandFactory as _};
+use clap::{Args, Command};
 use clap_complete::Shell;
 use serde::Serialize;
 
@@ -34,10 +33,9 @@ struct CompletionsObject<'a> {
     script: &'a str,
 }
 
-/// Runs the command.
-pub fn run(args: &CompletionsArgs, console: &Console) -> Outcome {
+/// Runs the verb; `command` is the whole program's.
+pub fn run(args: &CompletionsArgs, mut command: Command, console: &Console) -> Outcome {
     let mut script = Vec::new();
-    let mut command = Cli::command();
     let name = command.get_name().to_owned();
     clap_complete::generate(args.shell, &mut command, name, &mut script);
     let script = String::from_utf8_lossy(&script);

@@ -4,7 +4,7 @@ use super::Outcome;
 use super::error::Error;
 use super::export_blob::{self, BlobArgs};
 use super::export_folder;
-use super::export_form::FolderForm;
+use super::export_form::{FolderForm, FormatArg, Kind};
 use super::export_help::{EXAMPLE, FORMATS};
 use super::export_loss::LossObject;
 use super::export_mesh::{self, MeshArgs, MeshLoss};
@@ -18,7 +18,7 @@ use calib_blob::export::{self, ExportError, Form};
 use calib_exchange::mesh::MeshFormat;
 use calib_exchange::ply;
 use calib_recording::atomic_file;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -50,127 +50,6 @@ pub struct ExportArgs {
     /// Replace whatever stands in the output's place
     #[arg(long)]
     pub force: bool,
-}
-
-/// The form to write.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum FormatArg {
-    /// Intel HEX
-    Hex,
-    /// UF2, for bootloaders that show up as a drive
-    Uf2,
-    /// The bytes of the blob
-    Bin,
-    /// C source
-    C,
-    /// What a production line writes into a device's flash, so that it starts with the blob
-    SlotImage,
-    /// `OpenCV`'s `FileStorage`.
-    #[value(name = "opencv", help = "OpenCV's FileStorage, a folder")]
-    OpenCv,
-    /// Kalibr's `camchain.yaml`.
-    #[value(help = "Kalibr's camchain.yaml, a folder")]
-    Kalibr,
-    /// ROS' `camera_info`.
-    #[value(help = "ROS' camera_info, a folder")]
-    Ros,
-    /// mrcal's pinholes.
-    #[value(help = "mrcal's .cameramodel, LENSMODEL_OPENCV, a folder")]
-    Mrcal,
-    /// mrcal's splined model.
-    #[value(help = "mrcal's .cameramodel, splined stereographic, a folder")]
-    MrcalSplined,
-    /// Maps for `cv::remap`.
-    #[value(help = "Maps that undistort each camera, for OpenCV's remap, a folder")]
-    Remap,
-    /// Maps of a rectified pair.
-    #[value(help = "Maps and matrices of a rectified stereo pair, a folder")]
-    Rectify,
-    /// Undistorted images
-    Undistort,
-    /// The rays themselves.
-    #[value(help = "The ray of every pixel as NumPy arrays, a folder")]
-    Npy,
-    /// TI's LDC.
-    #[value(help = "The offsets of TI's LDC, a folder")]
-    MeshTi,
-    /// NXP's DW100.
-    #[value(help = "The vertices of NXP's DW100, a folder")]
-    MeshDw100,
-    /// NVIDIA's VPI.
-    #[value(help = "The warp map of NVIDIA's VPI, a folder")]
-    MeshVpi,
-    /// Luxonis' `StereoDepth`.
-    #[value(help = "The mesh of Luxonis' StereoDepth, a folder")]
-    MeshLuxonis,
-    /// An array.
-    #[value(help = "A mesh as a NumPy array, a folder")]
-    Mesh,
-    /// Points as PLY
-    Ply,
-}
-
-impl FormatArg {
-    pub(super) const fn name(self) -> &'static str {
-        match self {
-            Self::Hex => "hex",
-            Self::Uf2 => "uf2",
-            Self::Bin => "bin",
-            Self::C => "c",
-            Self::SlotImage => "slot-image",
-            Self::OpenCv => "opencv",
-            Self::Kalibr => "kalibr",
-            Self::Ros => "ros",
-            Self::Mrcal => "mrcal",
-            Self::MrcalSplined => "mrcal-splined",
-            Self::Remap => "remap",
-            Self::Rectify => "rectify",
-            Self::Undistort => "undistort",
-            Self::Npy => "npy",
-            Self::MeshTi => "mesh-ti",
-            Self::MeshDw100 => "mesh-dw100",
-            Self::MeshVpi => "mesh-vpi",
-            Self::MeshLuxonis => "mesh-luxonis",
-            Self::Mesh => "mesh",
-            Self::Ply => "ply",
-        }
-    }
-
-    /// What it takes to write it.
-    const fn kind(self) -> Kind {
-        match self {
-            Self::Hex => Kind::File(b":02000004"),
-            Self::Uf2 => Kind::File(b"UF2\n"),
-            Self::Bin => Kind::File(&ray_runtime::format::MAGIC),
-            Self::C => Kind::File(b"/* A ray blob"),
-            Self::SlotImage => Kind::Slot,
-            Self::OpenCv => Kind::Folder(FolderForm::OpenCv),
-            Self::Kalibr => Kind::Folder(FolderForm::Kalibr),
-            Self::Ros => Kind::Folder(FolderForm::Ros),
-            Self::Mrcal => Kind::Folder(FolderForm::Mrcal),
-            Self::MrcalSplined => Kind::Folder(FolderForm::MrcalSplined),
-            Self::Remap => Kind::Folder(FolderForm::Remap),
-            Self::Rectify => Kind::Folder(FolderForm::Rectify),
-            Self::Undistort => Kind::Folder(FolderForm::Undistort),
-            Self::Npy => Kind::Folder(FolderForm::Npy),
-            Self::MeshTi => Kind::Mesh(MeshFormat::Ti),
-            Self::MeshDw100 => Kind::Mesh(MeshFormat::Dw100),
-            Self::MeshVpi => Kind::Mesh(MeshFormat::Vpi),
-            Self::MeshLuxonis => Kind::Mesh(MeshFormat::Luxonis),
-            Self::Mesh => Kind::Mesh(MeshFormat::Plain),
-            Self::Ply => Kind::Points,
-        }
-    }
-}
-
-/// One file or several.
-enum Kind {
-    /// How every file of the form begins.
-    File(&'static [u8]),
-    Slot,
-    Folder(FolderForm),
-    Mesh(MeshFormat),
-    Points,
 }
 
 const SCHEMA: &str = "calib-offline/export/1";
@@ -215,7 +94,7 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<Outcome, Error> {
     check_options(args)?;
     match args.format.kind() {
         Kind::File(start) => write_file(args, start, console),
-        Kind::Slot => export_slot::write(args, console),
+        Kind::Slot => write_slot(args, console),
         Kind::Folder(form) => write_folder(args, form, console),
         Kind::Mesh(format) => write_mesh(args, format, console),
         Kind::Points => write_points(args, console),
@@ -371,31 +250,29 @@ fn write_file(args: &ExportArgs, start: &[u8], console: &Console) -> Result<Outc
     Ok(Outcome::Done)
 }
 
-/// What a slot's image was written as.
-pub(super) fn tell_of_slot(
-    args: &ExportArgs,
-    blob_bytes: usize,
-    file: &[u8],
-    base_address: u32,
-    slot: &SlotObject,
-    words: &str,
-    console: &Console,
-) {
+fn write_slot(args: &ExportArgs, console: &Console) -> Result<Outcome, Error> {
+    let written = export_slot::write(
+        &args.rig,
+        (&args.slot, &args.blob),
+        &args.output,
+        args.force,
+    )?;
     let object = ExportObject {
         schema: SCHEMA,
         output: &args.output,
         format: args.format.name(),
-        blob_bytes: Some(blob_bytes),
-        file_bytes: file.len(),
-        base_address: Some(base_address),
+        blob_bytes: Some(written.blob_bytes),
+        file_bytes: written.file_bytes,
+        base_address: Some(written.base_address),
         family: args.blob.family.map(|family| family.0),
         name: None,
         files: None,
         loss: None,
         points: None,
-        slot: Some(slot),
+        slot: Some(&written.object),
     };
-    console.result(words, &object);
+    console.result(&written.words, &object);
+    Ok(Outcome::Done)
 }
 
 /// Refuses what the form has no place for.

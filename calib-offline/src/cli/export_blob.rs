@@ -1,6 +1,6 @@
 //! The forms of `export` that are one file of a blob: hex, uf2, bin and c.
 
-use super::export::FormatArg;
+use super::export_form::FormatArg;
 use calib_blob::export::{ExportError, Family, Form, Uf2};
 use clap::Args;
 

@@ -1,10 +1,7 @@
 //! `export --format slot-image`: what a production line writes into a device's flash, so that it starts with the blob.
 
-use super::Outcome;
 use super::error::Error;
-use super::export::{ExportArgs, tell_of_slot};
-use super::export_blob::parse_number;
-use super::output::Console;
+use super::export_blob::{BlobArgs, parse_number};
 use super::place::check_file;
 use super::rig_file::{RigFile, open};
 use super::usage_error::UsageError;
@@ -15,7 +12,7 @@ use clap::{Args, ValueEnum};
 use firmware_sim::simulated::sim_flash::{Ecc, Rules};
 use firmware_sim::slot_image::{PARTS, Part, SlotImage, SlotImageOptions, slot_image};
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The arguments.
 #[derive(Debug, Args)]
@@ -150,20 +147,34 @@ pub(super) struct SlotObject {
     has_factory_record: bool,
 }
 
-/// Writes the image.
+/// What was written.
+pub(super) struct SlotWritten {
+    pub(super) blob_bytes: usize,
+    pub(super) file_bytes: usize,
+    pub(super) base_address: u32,
+    pub(super) object: SlotObject,
+    pub(super) words: String,
+}
+
+/// Writes the image with the blob of the file `rig` to `output`.
 ///
 /// # Errors
 /// [`Error`], with nothing written.
-pub(super) fn write(args: &ExportArgs, console: &Console) -> Result<Outcome, Error> {
-    let container = args.slot.container.unwrap_or(ContainerArg::Hex);
-    let has_factory_record = args.slot.serial.is_some();
+pub(super) fn write(
+    rig: &Path,
+    (args, blob): (&SlotArgs, &BlobArgs),
+    output: &Path,
+    is_forced: bool,
+) -> Result<SlotWritten, Error> {
+    let container = args.container.unwrap_or(ContainerArg::Hex);
+    let has_factory_record = args.serial.is_some();
     let start = container.start(has_factory_record);
-    check_file(&args.output, start, &[&args.rig], args.force)?;
+    check_file(output, start, &[rig], is_forced)?;
     let lacks = |option| UsageError::SlotImageLacks { option };
-    let region_address = args.slot.region_address;
+    let region_address = args.region_address;
     let region_address = region_address.ok_or(lacks("--region-address"))?;
-    let region_size = args.slot.region_size.ok_or(lacks("--region-size"))?;
-    let manifest = match &args.slot.manifest {
+    let region_size = args.region_size.ok_or(lacks("--region-size"))?;
+    let manifest = match &args.manifest {
         Some(path) => std::fs::read(path).map_err(|source| BlobError::Read {
             file: path.clone(),
             source,
@@ -171,23 +182,23 @@ pub(super) fn write(args: &ExportArgs, console: &Console) -> Result<Outcome, Err
         None => Vec::new(),
     };
     let options = SlotImageOptions {
-        rules: args.slot.rules()?,
+        rules: args.rules()?,
         region_address,
         region_size,
-        slot: args.slot.slot.unwrap_or(0),
-        serial: args.slot.serial.as_deref(),
+        slot: args.slot.unwrap_or(0),
+        serial: args.serial.as_deref(),
         manifest: &manifest,
     };
-    let RigFile::Blob(bytes) = RigFile::read(&args.rig)? else {
+    let RigFile::Blob(bytes) = RigFile::read(rig)? else {
         return Err(Error::Usage(UsageError::UnknownKind {
-            path: args.rig.clone(),
+            path: rig.to_owned(),
             expected: "a blob: make one of the calibration with calib-offline pack",
         }));
     };
-    open(&bytes, &args.rig)?;
+    open(&bytes, rig)?;
     let image = slot_image(&bytes, &options).map_err(UsageError::SlotImage)?;
-    let file = contained(args, container, &image, options.rules.erased)?;
-    atomic_file::write(&args.output, &file)?;
+    let file = contained(blob, container, &image, options.rules.erased)?;
+    atomic_file::write(output, &file)?;
     let programmed = image.pieces.iter().map(|piece| piece.bytes.len()).sum();
     let object = SlotObject {
         container: match container {
@@ -213,27 +224,24 @@ pub(super) fn write(args: &ExportArgs, console: &Console) -> Result<Outcome, Err
         bytes.len(),
         image.address,
         image.blob_address,
-        args.output.display()
+        output.display()
     );
     words += "; the rest of the region must be blank when the device starts";
     if options.rules.ecc != Ecc::None && container != ContainerArg::Hex {
         words += "; this part has ECC: what writes the blank units too leaves the device's log no room, so take --container hex";
     }
-    tell_of_slot(
-        args,
-        bytes.len(),
-        &file,
-        image.address,
-        &object,
-        &words,
-        console,
-    );
-    Ok(Outcome::Done)
+    Ok(SlotWritten {
+        blob_bytes: bytes.len(),
+        file_bytes: file.len(),
+        base_address: image.address,
+        object,
+        words,
+    })
 }
 
 /// The image as a file.
 fn contained(
-    args: &ExportArgs,
+    blob: &BlobArgs,
     container: ContainerArg,
     image: &SlotImage,
     erased: u8,
@@ -249,11 +257,11 @@ fn contained(
         }
         ContainerArg::Uf2 => {
             let mut bytes = image.bytes.clone();
-            bytes.resize(uf2_filled_len(bytes.len(), args.blob.family), erased);
+            bytes.resize(uf2_filled_len(bytes.len(), blob.family), erased);
             let uf2 = Uf2 {
                 base_address: image.address,
-                family: args.blob.family,
-                absolute_block: args.blob.absolute_block,
+                family: blob.family,
+                absolute_block: blob.absolute_block,
             };
             export::file(&bytes, &export::Form::Uf2(uf2))
         }

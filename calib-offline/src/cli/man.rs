@@ -1,12 +1,11 @@
 //! `man`: the manual pages, from the definitions that are parsed by.
 
 use super::Outcome;
-use super::args::Cli;
 use super::error::Error;
 use super::output::Console;
 use super::place::check_results_folder;
 use calib_recording::atomic_file::{WriteError, make_folder, write_set};
-use clap::{Args, Command, CommandFactory as _};
+use clap::{Args, Command};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -42,12 +41,12 @@ struct ManObject<'a> {
     pages: Vec<&'a str>,
 }
 
-/// Runs the command.
+/// Runs the verb; `program` is the whole program's command.
 ///
 /// # Errors
 /// [`Error`], with nothing written.
-pub fn run(args: &ManArgs, console: &Console) -> Result<Outcome, Error> {
-    let pages = pages().map_err(|source| WriteError::Io {
+pub fn run(args: &ManArgs, program: Command, console: &Console) -> Result<Outcome, Error> {
+    let pages = pages(program).map_err(|source| WriteError::Io {
         path: args.output.clone(),
         source,
     })?;
@@ -70,8 +69,7 @@ pub fn run(args: &ManArgs, console: &Console) -> Result<Outcome, Error> {
 }
 
 /// The pages with their names: that of the program, and one for each verb.
-fn pages() -> std::io::Result<Vec<(String, Vec<u8>)>> {
-    let mut program = Cli::command();
+fn pages(mut program: Command) -> std::io::Result<Vec<(String, Vec<u8>)>> {
     // So that each verb has the options that hold for all.
     program.build();
     let mut pages = vec![page(program.clone(), "calib-offline".to_owned())?];

@@ -15,17 +15,18 @@
 mod changes;
 #[cfg(feature = "integer")]
 mod integers;
+mod measure;
 mod self_test;
 
 use heapless::Vec;
-use ray_runtime::{MatchNoise, MeasureError, OpenError, PixelPoint, RayBlob};
+use ray_runtime::{MatchNoise, OpenError, RayBlob};
 
 use crate::health::Health;
 use crate::manifest::MANIFEST_LENGTH;
 use crate::port::{Clock, Regions};
 use crate::protocol::{
-    Arithmetic, BlobStatus, CameraStatus, Hello, MAX_CHUNK, MAX_MATCHES, Match, Measured,
-    OwnerStatus, Point, Refusal, Reply, Request, Rig, SlotState, Status, StoredBlob, name,
+    Arithmetic, BlobStatus, CameraStatus, Hello, MAX_CHUNK, MAX_MATCHES, Match, OwnerStatus,
+    Refusal, Reply, Request, Rig, SlotState, Status, StoredBlob, name,
 };
 use crate::session::Responder;
 use crate::storage;
@@ -35,6 +36,8 @@ use crate::storage::record::Record;
 use crate::storage::slot::SlotFlash;
 use crate::storage::transfer::{Peer, Transfer};
 use crate::storage::trust::{Claims, Trust};
+
+use measure::{Asked, measure_one};
 
 /// Version of the application, as [`Hello`] gives it.
 pub const FIRMWARE_VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -279,7 +282,7 @@ impl<'e, S: SlotFlash, C: Clock> Epoch<'e, S, C> {
     fn measure(&mut self, matches: &[Match], asked: Asked) -> Result<Reply, Refusal> {
         let blob = opened(&self.blob)?;
         #[cfg(feature = "integer")]
-        if let Some(integers) = integers::of(&self.integers)? {
+        if let Some(integers) = integers::of(self.integers.as_ref())? {
             let measured = matches
                 .iter()
                 .map(|asked| integers::measure(integers, asked));
@@ -295,7 +298,7 @@ impl<'e, S: SlotFlash, C: Clock> Epoch<'e, S, C> {
     fn self_test(&self) -> Result<Reply, Refusal> {
         let blob = opened(&self.blob)?;
         #[cfg(feature = "integer")]
-        if let Some(integers) = integers::of(&self.integers)? {
+        if let Some(integers) = integers::of(self.integers.as_ref())? {
             return Ok(Reply::SelfTested(integers::report(integers, blob)));
         }
         Ok(Reply::SelfTested(self_test::report(blob)))
@@ -344,45 +347,5 @@ fn blob_status(blob: &RayBlob<'_>) -> BlobStatus {
             width_px: camera.sensor_width,
             height_px: camera.sensor_height,
         })),
-    }
-}
-
-/// What is asked of matches.
-#[derive(Clone, Copy)]
-enum Asked {
-    /// Points alone.
-    Points,
-    /// Their standard deviations too, of pixels that are so noisy; that is the blob's business where it is not said.
-    Sigmas(Option<MatchNoise>),
-}
-
-/// The two pixels of a match.
-fn sightings(asked: &Match) -> [(usize, PixelPoint); 2] {
-    [asked.first, asked.second].map(|sighting| {
-        (
-            usize::from(sighting.camera),
-            PixelPoint::new(sighting.u_px, sighting.v_px),
-        )
-    })
-}
-
-fn measure_one(blob: &RayBlob<'_>, of: &Match, asked: Asked, health: &mut Health) -> Measured {
-    let [first, second] = sightings(of);
-    let outcome = match asked {
-        Asked::Points => blob.triangulate(first, second).map(Point::from),
-        Asked::Sigmas(noise) => {
-            let outcome = match noise {
-                Some(noise) => blob.triangulate_with_noise(first, second, noise),
-                None => blob.triangulate_with_covariance(first, second),
-            };
-            if let Ok(measured) = &outcome {
-                health.note(measured);
-            }
-            outcome.map(Point::from)
-        }
-    };
-    Measured {
-        id: of.id,
-        outcome: outcome.map_err(MeasureError::code),
     }
 }

@@ -43,7 +43,13 @@
 //! A rollback changes the sequence number and an abort ends the update, so an order works once, and on one
 //! device.
 
-use crate::protocol::{IDENTITY_LENGTH, MAX_NAME, Name, Signature, name};
+mod signature;
+
+use ray_runtime::format::IDENTITY_LEN;
+
+use crate::protocol::{MAX_NAME, Name, name};
+
+pub use signature::Signature;
 
 /// Length of a manifest with its signature, bytes.
 pub const MANIFEST_LENGTH: usize = BODY_LENGTH + SIGNATURE_LENGTH;
@@ -59,10 +65,6 @@ pub const SIGNED_ORDER_LENGTH: usize = DOMAIN_LENGTH + ORDER_LENGTH;
 
 /// Length of a piece of a blob, bytes.
 pub const PIECE_LENGTH: usize = 512;
-const _: () = assert!(
-    PIECE_LENGTH == crate::protocol::MAX_CHUNK,
-    "a piece travels as one chunk"
-);
 
 /// Length of a link of the chain, bytes.
 pub const LINK_LENGTH: usize = 32;
@@ -104,7 +106,7 @@ pub struct Manifest {
     /// CRC-32 of all its bytes: [`crate::frame::checksum`].
     pub checksum: u32,
     /// Hash of the calibration that it was packed from.
-    pub identity: [u8; IDENTITY_LENGTH],
+    pub identity: [u8; IDENTITY_LEN],
     /// Serial number of the one rig that it is for; `None` for any.
     pub rig_serial: Option<Name>,
     /// Root of the chain over its pieces.

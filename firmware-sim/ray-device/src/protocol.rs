@@ -8,17 +8,23 @@
 //!
 //! Pixels have (0, 0) at the center of the top-left pixel; points are in the rig's frame, mm.
 
+mod name;
+mod owner;
 mod refusal;
+mod unusable;
 
-use heapless::{String, Vec};
+use heapless::Vec;
 use ray_runtime::{Measurement, Triangulation};
 use serde::{Deserialize, Serialize};
 
 use crate::health::GapReport;
-use crate::manifest::{Action, Link, MANIFEST_LENGTH, MAX_KEYS};
-use crate::storage::trust::{Claims, KeyId};
+use crate::manifest::{Link, MANIFEST_LENGTH, PIECE_LENGTH};
 
+pub use crate::manifest::Signature;
+pub use name::{MAX_NAME, Name, name};
+pub use owner::{Claims, KeyId, Order, OwnerStatus};
 pub use refusal::{FlashOperation, Refusal, RigPart};
+pub use unusable::{Distrust, OTHER_PART};
 
 /// The protocol spoken here. It stands in every frame, and a device refuses any other.
 pub const PROTOCOL_VERSION: u8 = 4;
@@ -28,19 +34,17 @@ pub const MAX_MATCHES: usize = 28;
 
 /// Bytes of a blob in one [`Request::Chunk`]: a multiple of every program unit that the storage takes.
 pub const MAX_CHUNK: usize = 512;
+const _: () = assert!(
+    MAX_CHUNK == PIECE_LENGTH,
+    "a piece of a signed blob travels as one chunk"
+);
 
 /// Cameras listed in a [`Status`]; a blob may hold more, [`BlobStatus::camera_count`] says how
 /// many.
 pub const MAX_CAMERAS_LISTED: usize = 8;
 
-/// Longest name in a message, bytes. Longer ones are cut at a character.
-pub const MAX_NAME: usize = 32;
-
 /// Length of a blob's identity, bytes.
 pub const IDENTITY_LENGTH: usize = ray_runtime::format::IDENTITY_LEN;
-
-/// A name as it travels.
-pub type Name = String<MAX_NAME>;
 
 /// What a workstation asks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -132,41 +136,6 @@ pub struct NewBlob {
     /// The [`Manifest`](crate::manifest::Manifest) of its owner, empty without one:
     /// [`Hello::needs_signature`] says whether there must be one. Stored with the blob, asked for or not.
     pub manifest: Vec<u8, MANIFEST_LENGTH>,
-}
-
-/// What the owner of a device orders: the signature is of an [`OrderText`](crate::manifest::OrderText).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Order {
-    /// What is to be done.
-    pub action: Action,
-    /// Number of the key that signed it.
-    pub key: u8,
-    /// Sequence number of the blob that was active when it was signed; 0 if there was none.
-    pub sequence: u32,
-    /// Of the order's text.
-    pub signature: Signature,
-}
-
-/// An Ed25519 signature (RFC 8032).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Signature {
-    /// Its first half, a point.
-    pub r: [u8; 32],
-    /// Its second half, a number.
-    pub s: [u8; 32],
-}
-
-impl Signature {
-    /// From its 64 bytes.
-    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
-        let (r, s) = bytes.split_first_chunk()?;
-        Some(Self {
-            r: *r,
-            s: s.try_into().ok()?,
-        })
-    }
 }
 
 /// A piece of a blob on its way.
@@ -376,16 +345,6 @@ pub enum Arithmetic {
     Integer,
 }
 
-/// What a device with an owner tells of it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct OwnerStatus {
-    /// The first bytes of its public keys.
-    pub keys: [Option<KeyId>; MAX_KEYS],
-    /// What it has seen signed.
-    pub claims: Claims,
-}
-
 /// What a slot holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -400,8 +359,8 @@ pub enum SlotState {
     Unusable {
         /// Of its commit record.
         sequence: u32,
-        /// The stable code of the runtime's `OpenError`, or of the device's own: [`OTHER_PART`](crate::storage::OTHER_PART)
-        /// or that of a [`Distrust`](crate::storage::trust::Distrust).
+        /// The stable code of the runtime's `OpenError`, or of the device's own: [`OTHER_PART`]
+        /// or that of a [`Distrust`].
         open_error: u8,
     },
 }
@@ -456,17 +415,6 @@ pub struct CameraStatus {
     pub width_px: u32,
     /// Height of that sensor, px.
     pub height_px: u32,
-}
-
-/// `text` as it travels: cut at the last character that fits.
-pub fn name(text: &str) -> Name {
-    let mut name = Name::new();
-    for character in text.chars() {
-        if name.push(character).is_err() {
-            break;
-        }
-    }
-    name
 }
 
 #[cfg(test)]

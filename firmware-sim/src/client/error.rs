@@ -6,7 +6,7 @@ use std::time::Duration;
 use ray_runtime::OpenError;
 use thiserror::Error;
 
-use ray_device::protocol::Refusal;
+use ray_device::protocol::{Refusal, Reply};
 
 /// Why a device gave no answer, or not the one asked for.
 #[derive(Debug, Error)]
@@ -154,5 +154,23 @@ fn connect_advice(address: &str, source: &std::io::Error) -> &'static str {
         }
         _ if is_serial => "the port cannot be opened. Does another program have it open?",
         _ => "is it running, and is the address right?",
+    }
+}
+
+/// A device's answer is of another kind than what was asked.
+pub(super) fn unexpected(asked: &'static str, reply: &Reply) -> ClientError {
+    let found = match reply {
+        Reply::Refused(_) => "a refusal",
+        Reply::Hello(_) => "an answer to hello",
+        Reply::Status(_) => "an answer to status",
+        Reply::Measured(_) => "an answer to measure",
+        Reply::Receiving { .. } => "an acknowledgement of a blob's bytes",
+        Reply::Active(_) => "an answer to an update",
+        Reply::Aborted => "an answer to the end of an update",
+        Reply::SelfTested(_) => "an answer to the self-test",
+    };
+    ClientError::BadReply {
+        asked,
+        found: found.to_owned(),
     }
 }

@@ -3,9 +3,9 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use ray_runtime::{OpenError, RayBlob};
-
-use super::{ClientError, DeviceClient, unexpected};
+use super::error::unexpected;
+use super::{ClientError, DeviceClient};
+use crate::ask_blob::ask_blob;
 use ray_device::frame::checksum;
 use ray_device::manifest::{Link, ManifestBytes, NO_LINK, PIECE_LENGTH, link};
 use ray_device::protocol::{Chunk, MAX_CHUNK, NewBlob, Refusal, Reply, Request, StoredBlob, name};
@@ -313,16 +313,4 @@ fn received(reply: &Reply) -> Result<u32, ClientError> {
         Reply::Receiving { received } => Ok(*received),
         reply => Err(unexpected("a chunk", reply)),
     }
-}
-
-/// Asks a blob, which must be one, whole and readable.
-pub(crate) fn ask_blob<T>(
-    blob: &[u8],
-    ask: impl FnOnce(&RayBlob<'_>) -> T,
-) -> Result<T, OpenError> {
-    let mut words = vec![0_u64; blob.len().div_ceil(8)];
-    let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
-    let (bytes, _) = bytes.split_at_mut(blob.len());
-    bytes.copy_from_slice(blob);
-    RayBlob::open(bytes).map(|blob| ask(&blob))
 }

@@ -1,4 +1,4 @@
-//! Files of keys, as other programs write and read them: PKCS#8 for the private key, SubjectPublicKeyInfo
+//! Files of keys, as other programs write and read them: PKCS#8 for the private key, `SubjectPublicKeyInfo`
 //! for the public one (RFC 8410), both in PEM (RFC 7468).
 //!
 //! For Ed25519 both are a fixed head before the 32 bytes of the key, so they are compared, not parsed.

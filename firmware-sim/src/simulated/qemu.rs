@@ -3,14 +3,15 @@
 mod emulated;
 mod error;
 mod memory;
+mod programs;
 
 pub use emulated::{DEVICE, Emulated, SOFT_FLOAT};
 pub use error::QemuError;
+pub use programs::version_of;
 
-use std::io::ErrorKind;
 use std::net::{SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, ExitStatus, Stdio};
 use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -21,6 +22,7 @@ use crate::simulated::flash_file::{self, FlashFile};
 use ray_device::storage::trust::Keys;
 
 use memory::{Backing, Memory};
+use programs::root;
 
 /// From the start of QEMU to the first answer of the device. It takes about a quarter of a second;
 /// the rest is for machines under load.
@@ -29,20 +31,6 @@ const START_LIMIT: Duration = Duration::from_secs(30);
 /// Free ports tried before giving up: between the choice of one and QEMU's use of it, somebody else
 /// may take it.
 const PORT_TRIES: usize = 5;
-
-/// Runs its arguments and ends them when standard input closes. The parent holds the other end, so
-/// they end with it however it ends, a kill included.
-const ENDS_WITH_PARENT: &str = r#"
-exec 3<&0
-"$@" </dev/null 3<&- &
-child=$!
-{ read -r _ <&3; kill -KILL $child; } 2>/dev/null &
-watchdog=$!
-{ wait $child; } 2>/dev/null
-status=$?
-kill -KILL $watchdog 2>/dev/null
-exit $status
-"#;
 
 /// A device in QEMU. It ends when this is dropped, and when this process ends in any way.
 #[derive(Debug)]
@@ -221,44 +209,12 @@ pub fn build_signed_image(image: &str, keys: Keys) -> Result<PathBuf, QemuError>
     Ok(DEVICE.image_path(image))
 }
 
-/// The workspace's folder.
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .unwrap_or(Path::new("."))
-}
-
 /// Makes sure that QEMU is installed.
 ///
 /// # Errors
 /// As [`version_of`].
 pub fn require_qemu() -> Result<(), QemuError> {
     version_of(DEVICE.emulator).map(|_| ())
-}
-
-/// What one of QEMU's programs says of its version.
-///
-/// # Errors
-/// [`QemuError::NotInstalled`], with the remedy in its text.
-pub fn version_of(emulator: &str) -> Result<String, QemuError> {
-    let output = Command::new(emulator)
-        .arg("--version")
-        .stdin(Stdio::null())
-        .stderr(Stdio::null())
-        .output();
-    match output {
-        Ok(output) => {
-            let text = String::from_utf8_lossy(&output.stdout);
-            Ok(text.lines().next().unwrap_or_default().trim().to_owned())
-        }
-        Err(error) if error.kind() == ErrorKind::NotFound => Err(QemuError::NotInstalled {
-            program: emulator.to_owned(),
-        }),
-        Err(source) => Err(QemuError::Io {
-            what: format!("{emulator} --version"),
-            source,
-        }),
-    }
 }
 
 /// `listen` with a free port in place of 0, after a look whether it can be had at all.

@@ -18,6 +18,9 @@
 //! a blob in use on such bits.
 
 mod chip;
+mod effort;
+mod error;
+mod power;
 mod region;
 mod rules;
 
@@ -25,12 +28,14 @@ use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use ray_device::port::Regions;
 
 use chip::Chip;
-pub use region::{SimFlashError, SimRegion, SimSlot};
+pub use effort::Effort;
+pub use error::SimFlashError;
+pub use power::{Cut, PowerCut};
+pub use region::{SimRegion, SimSlot};
 pub use rules::{Areas, BadRules, Blank, Ecc, Rules};
 
 /// Length of an erase block by the default rules, bytes.
@@ -38,85 +43,6 @@ pub const BLOCK: usize = 4096;
 
 /// Length of a program unit by the default rules, bytes.
 pub const UNIT: usize = 8;
-
-/// What a cut of power leaves of the operation it hits. All bytes before the cut are done.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cut {
-    /// The rest as it was.
-    Clean,
-    /// In the rest, some of the bits changed.
-    Torn,
-    /// In the rest, the bits that were to change read differently each time.
-    Weak,
-}
-
-/// When power is lost.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PowerCut {
-    /// Number of the operation from now, from 0: each block erased and each unit programmed is one.
-    pub operation: u64,
-    /// How many of its bytes are done; all of them or more for a cut right behind it.
-    pub byte: usize,
-    /// What is left of the others.
-    pub cut: Cut,
-}
-
-/// What was done to a flash, counted, and how much of it since the watchdog was last fed.
-#[derive(Debug, Default)]
-pub struct Effort {
-    read: AtomicU64,
-    since_step: [AtomicU64; 3],
-    most: [AtomicU64; 3],
-}
-
-/// Kinds of effort.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Work {
-    Read,
-    Program,
-    Erase,
-}
-
-impl Effort {
-    /// To be called by the device's [`Clock::step`](ray_device::port::Clock::step).
-    pub fn step(&self) {
-        for count in &self.since_step {
-            count.store(0, Ordering::Relaxed);
-        }
-    }
-
-    /// Forgets what was between steps so far.
-    pub fn start_watching(&self) {
-        self.step();
-        for most in &self.most {
-            most.store(0, Ordering::Relaxed);
-        }
-    }
-
-    /// Bytes read through the driver from any slot, so far.
-    pub fn bytes_read(&self) -> u64 {
-        self.read.load(Ordering::Relaxed)
-    }
-
-    /// Most bytes read, most bytes programmed, and most blocks erased between two steps.
-    pub fn most_between_steps(&self) -> [u64; 3] {
-        self.most
-            .each_ref()
-            .map(|most| most.load(Ordering::Relaxed))
-    }
-
-    pub(crate) fn note(&self, work: Work, amount: u64) {
-        if matches!(work, Work::Read) {
-            self.read.fetch_add(amount, Ordering::Relaxed);
-        }
-        let kind = work as usize;
-        let (Some(since), Some(most)) = (self.since_step.get(kind), self.most.get(kind)) else {
-            return;
-        };
-        let sum = since.fetch_add(amount, Ordering::Relaxed) + amount;
-        most.fetch_max(sum, Ordering::Relaxed);
-    }
-}
 
 /// A simulated flash.
 #[derive(Debug)]

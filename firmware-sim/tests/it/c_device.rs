@@ -1,6 +1,7 @@
 //! `ray-runtime/c/rays_device.h`: two slots over callbacks, and the gaps of a C program's own measurements. The example gives what Rust
 //! gives, on the host and on Arm in QEMU; and power is cut at every operation of an update, on many kinds of flash.
 
+use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Command;
 
@@ -29,8 +30,8 @@ fn expected() -> String {
         (1, "rollback"),
         (0, "rollback"),
     ] {
-        text +=
-            &format!("{act}: 00000000 \nrestart: 00000000 {length:08x} wanted in slot {slot}\n");
+        writeln!(text, "{act}: 00000000 ").unwrap();
+        writeln!(text, "restart: 00000000 {length:08x} wanted in slot {slot}").unwrap();
     }
     let rig = RayBlob::open(&BLOB.0).unwrap();
     let mut state = 1u32;

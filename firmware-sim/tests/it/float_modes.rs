@@ -1,6 +1,8 @@
 //! What modes of the floating-point unit do: those that change subnormal numbers, NaN or half precision change no bit
 //! of any golden blob's answers; in another rounding mode none opens, and the error says which.
 
+use std::fmt::Write as _;
+
 use crate::same_bits::{blobs, digest_on_host};
 use firmware_cost::same_bits::FLOAT_MODE_MATCHES;
 use firmware_sim::simulated::qemu;
@@ -23,11 +25,11 @@ fn equal_bits_in_every_harmless_mode_and_no_blob_in_another_rounding() {
         ];
         let mut expected = String::new();
         for mode in harmless {
-            expected += &format!("{mode} {host}\n");
+            writeln!(expected, "{mode} {host}").unwrap();
         }
         // The error's code, in blobs of every version.
         for mode in ["up", "down", "to-zero"] {
-            expected += &format!("{mode} code 16\n");
+            writeln!(expected, "{mode} code 16").unwrap();
         }
         assert_eq!(printed, expected, "{name}");
     }

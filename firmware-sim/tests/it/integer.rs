@@ -1,6 +1,7 @@
 //! Devices that compute in integers: on the host behind a port, and the same bits in images for cores with and without a
 //! floating-point unit.
 
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -10,7 +11,7 @@ use firmware_sim::simulated::flash_file;
 use firmware_sim::simulated::host::SimulatedDevice;
 use ray_device::protocol::{Arithmetic, Match, Sighting};
 use ray_runtime::integer::Rig;
-use ray_runtime::{PixelPoint, RayBlob};
+use ray_runtime::{MeasureError, PixelPoint, RayBlob};
 
 /// As many as the image answers of each blob.
 const MATCHES: u32 = 20_000;
@@ -82,7 +83,7 @@ fn a_device_measures_in_integers_and_says_so() {
                     assert_eq!(there.sigma_mm, None);
                     count += 1;
                 }
-                (there, here) => assert_eq!(there.err(), here.map_err(|e| e.code()).err()),
+                (there, here) => assert_eq!(there.err(), here.map_err(MeasureError::code).err()),
             }
             // Points alone are those with standard deviations.
             match (points[k].outcome, sigmas[k].outcome) {
@@ -152,28 +153,30 @@ fn printed(image: &str, target: &str, machine: [&str; 2]) -> String {
 fn here() -> String {
     let mut names: Vec<_> = std::fs::read_dir(root().join("data/golden"))
         .unwrap()
-        .map(|file| file.unwrap().file_name().into_string().unwrap())
-        .filter(|name| name.ends_with(".rays"))
+        .map(|file| file.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|ending| ending == "rays"))
+        .map(|path| path.file_name().unwrap().to_str().unwrap().to_owned())
         .collect();
     names.sort();
-    names
-        .iter()
-        .map(|name| {
-            let contents = golden(name);
-            let words = aligned(&contents);
-            let blob = RayBlob::open(&bytemuck::cast_slice(&words)[..contents.len()]).unwrap();
-            let tests = Rig::<2>::prepare(&blob)
-                .unwrap()
-                .run_self_tests(&blob)
-                .unwrap();
-            let digest = digest_of_integers(&blob, MATCHES).unwrap();
-            assert!(digest.points > MATCHES / 5, "{name}");
-            format!(
-                "{:08x} {:08x} {tests:08x} \n",
-                digest.checksum, digest.points
-            )
-        })
-        .collect()
+    let mut lines = String::new();
+    for name in &names {
+        let contents = golden(name);
+        let words = aligned(&contents);
+        let blob = RayBlob::open(&bytemuck::cast_slice(&words)[..contents.len()]).unwrap();
+        let tests = Rig::<2>::prepare(&blob)
+            .unwrap()
+            .run_self_tests(&blob)
+            .unwrap();
+        let digest = digest_of_integers(&blob, MATCHES).unwrap();
+        assert!(digest.points > MATCHES / 5, "{name}");
+        writeln!(
+            lines,
+            "{:08x} {:08x} {tests:08x} ",
+            digest.checksum, digest.points
+        )
+        .unwrap();
+    }
+    lines
 }
 
 #[test]
@@ -187,7 +190,7 @@ fn integers_give_the_same_bits_on_the_host_a_cortex_m4f_and_a_core_without_a_flo
     }
 }
 
-/// Code of the Cortex-M0, on a core that runs the same instructions beside a SysTick of 25 MHz.
+/// Code of the Cortex-M0, on a core that runs the same instructions beside a `SysTick` of 25 MHz.
 #[test]
 fn points_in_integers_take_a_tenth_of_the_instructions_of_f32_in_software() {
     let counts = printed(

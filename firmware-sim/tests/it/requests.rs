@@ -177,7 +177,6 @@ fn answer(trust: Trust, has_blob: bool, state: State, request: &Request) -> (u8,
     };
     let reply = epoch.respond_to(ASKING, request);
     drop(epoch);
-    drop(regions);
     let has_changed = flash.contents() != contents;
     if has_changed {
         // Only a piece, or what makes a blob count, writes; and never where the blob in use is.

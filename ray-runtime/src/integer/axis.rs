@@ -127,7 +127,7 @@ impl Place {
         // 15 and 16 binary digits by 10 of the cells.
         let (high, low) = ((self.0 >> 16) * cells, (self.0 & 0xffff) * cells);
         let cell = (high + (low >> 16)) >> 15;
-        let fraction = (high << 16).wrapping_add(low) & (1 << 31) - 1;
+        let fraction = (high << 16).wrapping_add(low) & ((1 << 31) - 1);
         (cell, fraction)
     }
 }

@@ -99,7 +99,7 @@ mod tests {
             let exact = i64::from(a) * i64::from(half);
             assert_eq!(i64::from(product_by_half(a, half)), exact >> 16);
             let (a, b) = (a.cast_unsigned(), b.cast_unsigned());
-            let below = (u64::from(a) * u64::from(b) >> 32) - u64::from(product_unsigned(a, b));
+            let below = ((u64::from(a) * u64::from(b)) >> 32) - u64::from(product_unsigned(a, b));
             assert!(below <= 3, "{a} {b} {below}");
         }
     }

@@ -120,8 +120,7 @@ fn of_point(found: Triangulation) -> Vec<f32> {
 /// What `print_info` must print.
 fn expected_info(blob: &RayBlob<'_>) -> String {
     let identity = blob.identity().map(|byte| format!("{byte:02x}")).concat();
-    let [error, distance] =
-        [blob.max_error_px(), blob.working_distance_mm()].map(|number| number.to_bits());
+    let [error, distance] = [blob.max_error_px(), blob.working_distance_mm()].map(f32::to_bits);
     let length = blob.len();
     format!(
         "info | 00 {identity} {error:08x} {distance:08x} {length:08x}, header and library agree\n"
@@ -197,10 +196,10 @@ pub(super) fn check_bits(mut print: impl FnMut(&Path) -> String) {
     }
 }
 
-#[test]
-fn codes_of_the_header_are_those_of_rust() {
+/// The header's names of what opening a blob can answer, without their beginning.
+fn open_errors() -> [(&'static str, OpenError); 16] {
     let (need, have) = (0, 0);
-    let open = [
+    [
         ("TRUNCATED", OpenError::Truncated { need, have }),
         ("BAD_MAGIC", OpenError::BadMagic { found: 0 }),
         (
@@ -252,7 +251,11 @@ fn codes_of_the_header_are_those_of_rust() {
                 found: Rounding::TowardZero,
             },
         ),
-    ];
+    ]
+}
+
+#[test]
+fn codes_of_the_header_are_those_of_rust() {
     let measure = [
         ("OUTSIDE", MeasureError::Outside { camera: 0 }),
         (
@@ -284,7 +287,7 @@ fn codes_of_the_header_are_those_of_rust() {
         ("NOT_OPEN", 129),
         ("SELF_TEST_FAILED", 130),
     ];
-    let mut expected: Vec<(String, u8)> = open
+    let mut expected: Vec<(String, u8)> = open_errors()
         .map(|(name, error)| (name, error.code()))
         .into_iter()
         .chain(measure.map(|(name, error)| (name, error.code())))

@@ -1,4 +1,4 @@
-//! The C library as a CMake package and by pkg-config: built, installed, found by somebody else's project, and run.
+//! The C library as a `CMake` package and by pkg-config: built, installed, found by somebody else's project, and run.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -6,7 +6,7 @@ use std::process::Command;
 use super::c_build::{build_for_host, c_folder, made, root, run, succeed};
 use super::c_interface::check_bits;
 
-/// An installation of the package, with the library that cargo built for the other tests; `None`, with the reason said, without CMake.
+/// An installation of the package, with the library that cargo built for the other tests; `None`, with the reason said, without `CMake`.
 fn install(name: &str) -> Option<PathBuf> {
     if Command::new("cmake").arg("--version").output().is_err() {
         eprintln!(
@@ -74,7 +74,7 @@ fn build_and_check(project: &Path) {
     check_bits(|blob| succeed(Command::new(&program).arg(blob)));
 }
 
-/// What CMake said, which it breaks into lines where it likes to.
+/// What `CMake` said, which it breaks into lines where it likes to.
 fn in_one_line(said: &[u8]) -> String {
     let said = String::from_utf8_lossy(said);
     said.split_whitespace().collect::<Vec<_>>().join(" ")

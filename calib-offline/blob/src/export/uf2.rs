@@ -6,8 +6,9 @@
 //! their addresses. So for them a file starts where a sector starts and fills its last one. A block
 //! that names no family they leave alone.
 
+use super::address::check_address;
+use super::error::ExportError;
 use super::uf2_family::{ABSOLUTE, Family};
-use super::{ExportError, check_address};
 
 /// Bytes of a block.
 pub const BLOCK_LEN: usize = 512;

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 const BLOB: &[u8] = include_bytes!("../../../../data/golden/stereo-v3-fast.rays");
 const FLASH_START: u32 = 0x1000_0000;
 /// 2 MiB, and what stood there before.
-const USED_FLASH: [u8; 2 << 20] = [0x5a; 2 << 20];
+static USED_FLASH: [u8; 2 << 20] = [0x5a; 2 << 20];
 
 fn word(block: &[u8], at: usize) -> u32 {
     u32::from_le_bytes(block[at..at + 4].try_into().unwrap())

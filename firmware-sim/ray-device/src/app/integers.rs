@@ -3,7 +3,7 @@
 use ray_runtime::integer::{self, Unsuited};
 use ray_runtime::{MeasureError, RayBlob};
 
-use super::sightings;
+use super::measure::sightings;
 use crate::protocol::{
     Arithmetic, MAX_CAMERAS_LISTED, Match, Measured, Point, Refusal, SelfTestReport,
 };
@@ -21,7 +21,7 @@ pub fn prepared<'a>(
 }
 
 /// What is prepared, if anything is to be.
-pub fn of<'r, 'a>(rig: &'r Option<Result<Rig<'a>, u8>>) -> Result<Option<&'r Rig<'a>>, Refusal> {
+pub fn of<'r, 'a>(rig: Option<&'r Result<Rig<'a>, u8>>) -> Result<Option<&'r Rig<'a>>, Refusal> {
     match rig {
         None => Ok(None),
         Some(Ok(rig)) => Ok(Some(rig)),

@@ -1,20 +1,21 @@
 //! The bytes of every message. A test that fails here means that devices in the field no longer
 //! understand: raise `PROTOCOL_VERSION`, or do not change the message.
 
+mod refusals;
+
 use heapless::Vec;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::{
-    Arithmetic, BlobStatus, CameraStatus, Chunk, FlashOperation, Hello, MAX_CAMERAS_LISTED,
-    MAX_CHUNK, MAX_MATCHES, MAX_NAME, Match, Measured, Name, NewBlob, NoisyMatches, Order,
-    OwnerStatus, Point, Refusal, Reply, Request, Rig, RigPart, SelfTestReport, Sighting, Signature,
-    SlotState, Status, StoredBlob, UpdateStatus, name,
+    Arithmetic, BlobStatus, CameraStatus, Chunk, Claims, Hello, MAX_CAMERAS_LISTED, MAX_CHUNK,
+    MAX_MATCHES, MAX_NAME, Match, Measured, Name, NewBlob, NoisyMatches, Order, OwnerStatus, Point,
+    Refusal, Reply, Request, Rig, SelfTestReport, Sighting, Signature, SlotState, Status,
+    StoredBlob, UpdateStatus, name,
 };
 use crate::frame::{FrameWriter, MAX_MESSAGE};
 use crate::health::{GapReport, Predicted};
 use crate::manifest::{Action, MANIFEST_LENGTH};
-use crate::storage::trust::Claims;
 
 /// Asserts that `message` is exactly `bytes`, in both directions.
 fn assert_bytes<T: Serialize + DeserializeOwned + PartialEq + std::fmt::Debug>(
@@ -149,6 +150,7 @@ fn bytes_of_an_update() {
         &[7, 3, 2, 1, 0, 0, 0x80, 0x3f, 0, 0, 0, 0x3f],
     );
 }
+
 const GAPS: GapReport = GapReport {
     points: 3,
     mean_signed_mm: -1.0,
@@ -179,85 +181,6 @@ const OWNER: OwnerStatus = OwnerStatus {
         least_key: 1,
     },
 };
-
-#[test]
-fn bytes_of_an_updates_refusals() {
-    use Refusal as R;
-    let rig = R::OtherRig {
-        camera: 1,
-        what: RigPart::Height,
-        expected: 3,
-        found: 4,
-    };
-    let failed = R::FlashFailed {
-        operation: FlashOperation::Program,
-        address: 128,
-    };
-    for (refusal, bytes) in [
-        (R::TooLong { limit: 1 }, &[6, 1][..]),
-        (R::WrongOffset { expected: 128 }, &[7, 0x80, 0x01]),
-        (R::BadChunk { missing: 8 }, &[8, 8]),
-        (R::NoUpdate, &[9]),
-        (R::Incomplete { received: 5 }, &[10, 5]),
-        (
-            R::ChecksumMismatch {
-                announced: 1,
-                stored: 2,
-            },
-            &[11, 1, 2],
-        ),
-        (R::NotABlob { open_error: 5 }, &[12, 5]),
-        (R::OtherIdentity, &[13]),
-        (rig, &[14, 1, 3, 3, 4]),
-        (R::NothingToRollBackTo, &[15]),
-        (R::LogFull, &[16]),
-        (failed, &[17, 2, 0x80, 0x01]),
-        (R::Busy { wait_ms: 7 }, &[18, 7]),
-        (R::NotSigned, &[19]),
-        (R::BadSignature, &[20]),
-        (R::BadNoise, &[21]),
-        (R::BadManifest { format: 2 }, &[22, 2]),
-        (R::OtherManifest, &[23]),
-        (R::NoSuchKey, &[24]),
-        (R::KeyRetired { key: 0 }, &[25, 0]),
-        (
-            R::VersionTooOld {
-                version: 1,
-                least: 2,
-            },
-            &[26, 1, 2],
-        ),
-        (R::WrongPiece { offset: 128 }, &[27, 0x80, 0x01]),
-        (R::NeedsOrder, &[28]),
-        (R::StaleOrder { sequence: 5 }, &[29, 5]),
-        (R::NoOwner, &[30]),
-        (R::TooManyStarts { wait_ms: 6 }, &[31, 6]),
-    ] {
-        assert_bytes(&Reply::Refused(refusal), &[&[0], bytes].concat());
-        // In words, of which the last say what to do.
-        assert!(refusal.to_string().len() > 40, "{refusal}");
-    }
-}
-
-#[test]
-fn bytes_of_refusals() {
-    assert_bytes(
-        &Reply::Refused(Refusal::Oversized { limit: 1030 }),
-        &[0, 0, 0x86, 0x08],
-    );
-    assert_bytes(&Reply::Refused(Refusal::BadFrame), &[0, 1]);
-    assert_bytes(&Reply::Refused(Refusal::BadChecksum), &[0, 2]);
-    let refusal = Refusal::WrongVersion {
-        found: 9,
-        supported: 1,
-    };
-    assert_bytes(&Reply::Refused(refusal), &[0, 3, 9, 1]);
-    assert_bytes(&Reply::Refused(Refusal::UnknownMessage), &[0, 4]);
-    assert_bytes(
-        &Reply::Refused(Refusal::NoBlob { open_error: 2 }),
-        &[0, 5, 2],
-    );
-}
 
 #[test]
 fn bytes_of_answers() {
@@ -295,7 +218,7 @@ fn bytes_of_answers() {
     };
     assert_bytes(
         &Reply::Status(without.clone()),
-        &[2, 1, 2, 3, 1, 5, 0, 0, 1, 0, 4, 5, 6, 0, 0, 0],
+        &[2, 1, 2, 3, 1, 5, 0, 0, 1, 0, 4, 5, 6, 0, 0, 0, 0],
     );
     let camera = CameraStatus {
         name: name("l"),
@@ -523,40 +446,4 @@ fn a_long_name_is_cut_at_a_character() {
     assert_eq!(name("left"), "left");
     let long = format!("{}äb", "n".repeat(MAX_NAME - 1));
     assert_eq!(name(&long), "n".repeat(MAX_NAME - 1).as_str());
-}
-
-/// The words for a code are tied to the runtime's numbering.
-#[test]
-fn a_refusal_for_want_of_a_blob_says_why() {
-    use ray_runtime::{OpenError, Rounding};
-    for (error, words) in [
-        (OpenError::BadMagic { found: 0 }, "holds no blob"),
-        (
-            OpenError::WrongVersion {
-                found: 2,
-                supported: 1,
-            },
-            "version",
-        ),
-        (
-            OpenError::BadCrc {
-                stated: 0,
-                computed: 1,
-            },
-            "damaged",
-        ),
-        (OpenError::BadHeader, "cannot be opened (code 7): flash one"),
-        (
-            OpenError::WrongRounding {
-                found: Rounding::TowardZero,
-            },
-            "round to nearest",
-        ),
-    ] {
-        let text = Refusal::NoBlob {
-            open_error: error.code(),
-        }
-        .to_string();
-        assert!(text.contains(words), "{text}");
-    }
 }

@@ -15,8 +15,8 @@
 //! ```
 
 use super::layout::{RECORD_LENGTH, Shape};
-pub use super::trust::Claims;
 use crate::frame::checksum;
+pub use crate::protocol::Claims;
 
 /// What makes the blob of a slot count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -8,11 +8,12 @@ use ray_runtime::OpenError;
 use ray_runtime::format::HEADER_LEN;
 
 use super::budget::Budget;
+use super::contents::{open_verified, program_blob, program_manifest, read_blob, stored_checksum};
 use super::log::{Log, erase_log};
 use super::record::Record;
+use super::rig;
 use super::slot::SlotFlash;
 use super::trust::{self, Claims, Trust, Verified};
-use super::{open_verified, program_blob, program_manifest, read_blob, rig, stored_checksum};
 use crate::manifest::{MANIFEST_LENGTH, NO_LINK};
 use crate::port::Clock;
 use crate::protocol::{Chunk, MAX_CHUNK, NewBlob, Refusal, Rig, UpdateStatus};
@@ -267,12 +268,11 @@ impl Transfer {
     /// an owner, any that was stored, as several peers may be sending.
     fn is_repeat<S: SlotFlash>(&self, slot: &mut S, chunk: &Chunk) -> bool {
         let end = chunk.offset.saturating_add(chunk.bytes.len() as u32);
-        let may_be = match &self.verified {
-            None => chunk.offset == self.last_offset && end == self.received,
-            Some(_) => {
-                let within = chunk.offset & (MAX_CHUNK as u32 - 1);
-                within == 0 && end <= self.received
-            }
+        let may_be = if self.verified.is_some() {
+            let within = chunk.offset & (MAX_CHUNK as u32 - 1);
+            within == 0 && end <= self.received
+        } else {
+            chunk.offset == self.last_offset && end == self.received
         };
         if !may_be || chunk.bytes.is_empty() {
             return false;

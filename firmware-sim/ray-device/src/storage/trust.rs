@@ -12,14 +12,13 @@
 
 mod keys;
 
-use serde::{Deserialize, Serialize};
-
 use crate::manifest::{Link, Malformed, Manifest};
 use crate::protocol::{NewBlob, Refusal, Rig, RigPart, Signature};
 
+pub use crate::protocol::{Claims, Distrust, KeyId};
+pub use keys::Keys;
 #[cfg(feature = "signed")]
 pub use keys::PublicKey;
-pub use keys::{KeyId, Keys};
 
 /// Who may change a device.
 #[derive(Clone, Copy, Debug, Default)]
@@ -29,18 +28,6 @@ pub enum Trust {
     Anybody,
     /// The owner of these keys.
     Owner(Keys),
-}
-
-/// What a device has seen signed; all 0 without an owner.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Claims {
-    /// The highest version that was ever in use.
-    pub newest_version: u32,
-    /// No blob of a lower version is used.
-    pub least_version: u32,
-    /// Keys with a lower number are retired.
-    pub least_key: u32,
 }
 
 impl Claims {
@@ -201,79 +188,6 @@ pub fn check_rig(manifest: &Manifest, rig: Option<&Rig>) -> Result<(), Refusal> 
     match &manifest.rig_serial {
         Some(serial) if rig.is_none_or(|own| own.serial != *serial) => Err(OTHER_SERIAL),
         _ => Ok(()),
-    }
-}
-
-/// Why a device with an owner does not use a whole blob: codes behind those of the runtime's `OpenError`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Distrust {
-    /// There is no manifest with it.
-    NotSigned = 160,
-    /// The manifest cannot be read.
-    BadManifest = 161,
-    /// It is not signed by a key of the device, or damaged.
-    BadSignature = 162,
-    /// It is of another blob, or the blob is damaged.
-    OtherManifest = 163,
-    /// It is for another rig.
-    OtherRig = 164,
-    /// Its key is retired.
-    KeyRetired = 165,
-    /// Its version is below the least that may be used.
-    VersionTooOld = 166,
-}
-
-impl Distrust {
-    /// All of them.
-    pub const ALL: [Self; 7] = [
-        Self::NotSigned,
-        Self::BadManifest,
-        Self::BadSignature,
-        Self::OtherManifest,
-        Self::OtherRig,
-        Self::KeyRetired,
-        Self::VersionTooOld,
-    ];
-
-    /// Its stable code.
-    pub const fn code(self) -> u8 {
-        self as u8
-    }
-
-    /// The one with this code.
-    pub fn from_code(code: u8) -> Option<Self> {
-        Self::ALL.into_iter().find(|reason| reason.code() == code)
-    }
-
-    /// The one that a refusal of [`Keys::check_stored`] stands for.
-    pub const fn of(refusal: Refusal) -> Self {
-        match refusal {
-            Refusal::NotSigned => Self::NotSigned,
-            Refusal::BadManifest { .. } => Self::BadManifest,
-            Refusal::OtherManifest => Self::OtherManifest,
-            Refusal::OtherRig { .. } => Self::OtherRig,
-            Refusal::KeyRetired { .. } => Self::KeyRetired,
-            Refusal::VersionTooOld { .. } => Self::VersionTooOld,
-            _ => Self::BadSignature,
-        }
-    }
-}
-
-/// In words, with what to do.
-impl core::fmt::Display for Distrust {
-    fn fmt(&self, out: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        out.write_str(match self {
-            Self::NotSigned => "it is not signed, and the device has an owner: sign it and flash it again",
-            Self::BadManifest => "its manifest cannot be read: flash it again",
-            Self::BadSignature => {
-                "it was not signed with a key of this device: sign it with the owner's key and flash it again"
-            }
-            Self::OtherManifest => "its manifest is of other bytes, or they are damaged: flash it again",
-            Self::OtherRig => "it was signed for another rig: flash the blob of this one",
-            Self::KeyRetired => "the key that signed it is retired: sign it with the key after it",
-            Self::VersionTooOld => "its version is below the least that the owner allows",
-        })
     }
 }
 

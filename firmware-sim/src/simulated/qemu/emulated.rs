@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use super::error::QemuError;
 use super::memory::Memory;
-use super::{ENDS_WITH_PARENT, root, version_of};
+use super::programs::{ENDS_WITH_PARENT, root, version_of};
 
 /// How long an image that ends by itself may run. Checks take a second; one that crashes hangs.
 const RUN_LIMIT: Duration = Duration::from_mins(3);
@@ -192,7 +192,7 @@ impl Emulated<'_> {
     pub(super) fn command(&self, image: &Path, memory: &Memory<'_>) -> Result<Command, QemuError> {
         let mut command = Command::new("sh");
         command.args(["-c", ENDS_WITH_PARENT, "sh", self.emulator]);
-        command.args(memory.arguments(self)?);
+        command.args(memory.arguments(self.machine, self.stored_at)?);
         if self.target.starts_with("riscv") {
             // The image is all that runs.
             command.args(["-bios", "none"]);

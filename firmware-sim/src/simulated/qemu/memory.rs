@@ -6,7 +6,6 @@ use std::process::Stdio;
 
 use tempfile::NamedTempFile;
 
-use super::emulated::Emulated;
 use super::error::QemuError;
 use crate::simulated::flash_file::{FLASH_LENGTH, FlashFile, Kept};
 use crate::simulated::sim_flash::Rules;
@@ -67,8 +66,8 @@ pub enum Memory<'a> {
 }
 
 impl Memory<'_> {
-    /// What to start QEMU with.
-    pub fn arguments(&self, board: &Emulated<'_>) -> Result<Vec<String>, QemuError> {
+    /// What to start QEMU's `machine` with, which loads what an image reads at `stored_at`.
+    pub fn arguments(&self, machine: &str, stored_at: u32) -> Result<Vec<String>, QemuError> {
         let mut arguments = Vec::new();
         if let Self::File(path) = self {
             let (file, size) = (in_option(path), FLASH_LENGTH);
@@ -78,19 +77,18 @@ impl Memory<'_> {
             ));
             // What QEMU takes for this board's main memory is the PSRAM that stands for the flash.
             arguments.push("-machine".to_owned());
-            arguments.push(format!("{},memory-backend=flash", board.machine));
+            arguments.push(format!("{machine},memory-backend=flash"));
             return Ok(arguments);
         }
         arguments.push("-machine".to_owned());
-        arguments.push(board.machine.to_owned());
+        arguments.push(machine.to_owned());
         if let Self::StartsWith(path) = self
             && length_of(path)? > 0
         {
             let file = in_option(path);
             arguments.push("-device".to_owned());
             arguments.push(format!(
-                "loader,file={file},addr={:#x},force-raw=on",
-                board.stored_at
+                "loader,file={file},addr={stored_at:#x},force-raw=on"
             ));
         }
         Ok(arguments)

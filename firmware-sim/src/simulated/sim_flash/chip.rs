@@ -7,8 +7,10 @@ use std::sync::Arc;
 
 use split_mix::SplitMix;
 
+use super::effort::Effort;
+use super::error::SimFlashError;
+use super::power::{Cut, PowerCut};
 use super::rules::{Blank, Ecc, Rules};
-use super::{Cut, Effort, PowerCut, SimFlashError};
 
 /// What is not the contents.
 #[derive(Debug)]

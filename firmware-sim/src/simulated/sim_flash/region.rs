@@ -4,44 +4,14 @@ use std::cell::RefCell;
 use std::thread;
 use std::time::Duration;
 
-use embedded_storage::nor_flash::{
-    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
-};
+use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use ray_device::port::{Flash, Geometry, MappedFlash};
 use ray_device::storage::slot::SlotFlash;
 
-use super::Work;
 use super::chip::{Change, Chip};
+use super::effort::Work;
+use super::error::SimFlashError;
 use super::rules::Blank;
-
-/// Why the flash did not do as it was told.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SimFlashError {
-    /// Outside of the region.
-    OutOfBounds,
-    /// Not on a boundary of a block or unit.
-    NotAligned,
-    /// The unit is not blank.
-    NotErased,
-    /// The block or unit is broken.
-    Broken,
-    /// There is no power.
-    PowerOff,
-    /// A word cannot be read: it was spoiled, or it is blank.
-    Unreadable,
-    /// The file behind it could not be written.
-    File,
-}
-
-impl NorFlashError for SimFlashError {
-    fn kind(&self) -> NorFlashErrorKind {
-        match self {
-            Self::OutOfBounds => NorFlashErrorKind::OutOfBounds,
-            Self::NotAligned => NorFlashErrorKind::NotAligned,
-            _ => NorFlashErrorKind::Other,
-        }
-    }
-}
 
 /// A part of a simulated flash.
 #[derive(Debug)]

@@ -1,8 +1,8 @@
 //! The keys that a device verifies signatures with.
 
-use super::{Claims, check_rig, read};
+use super::{check_rig, read};
 use crate::manifest::{Link, MAX_KEYS, Manifest};
-use crate::protocol::{Refusal, Rig, Signature};
+use crate::protocol::{Claims, KeyId, Refusal, Rig, Signature};
 
 /// The keys of a device's owner: key 0, and perhaps key 1 for the day on which key 0 is lost.
 #[cfg(feature = "signed")]
@@ -13,9 +13,6 @@ pub struct Keys([Option<PublicKey>; MAX_KEYS]);
 #[cfg(not(feature = "signed"))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Keys {}
-
-/// What of a key a device shows: its first bytes.
-pub type KeyId = [u8; 8];
 
 #[cfg(feature = "signed")]
 impl Keys {
