@@ -10,6 +10,7 @@ use ray_device::storage::factory::Factory;
 use ray_device::storage::log::{Log, erase_log};
 use ray_device::storage::record::{Claims, Record};
 use ray_device::storage::slot::SlotFlash;
+use ray_device::storage::trust::Trust;
 use ray_device::storage::{
     self as slots, blob_bytes, open_verified, program_blob, stored_checksum, verify,
 };
@@ -108,7 +109,12 @@ pub unsafe extern "C" fn rays_storage_start(
         return BAD_FLASH;
     }
     let [first, _] = drivers;
-    let booted = slots::boot(&mut started.regions, &mut first.steps());
+    let booted = slots::boot(
+        &mut started.regions,
+        Trust::Anybody,
+        None,
+        &mut first.steps(),
+    );
     started.active = booted.active.map(|slot| u8::from(slot != 0));
     started.open_error = booted.open_error;
     started.records = booted.records;
