@@ -172,7 +172,7 @@ fn cores_of_another_target_are_counted_beside_their_conditions() {
     let [blob] = core["blobs"].as_array().unwrap().as_slice() else {
         panic!("not one blob: {across}");
     };
-    // Emulated numbers cost much more than those of an FPU, which takes 485.
+    // Emulated numbers cost much more than those of an FPU, which takes 387.
     let triangulate = most(blob, "triangulate");
     assert!((10_000..20_000).contains(&triangulate), "{triangulate}");
     assert!(most(blob, "lookup") < triangulate);
