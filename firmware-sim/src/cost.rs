@@ -24,8 +24,8 @@ impl Images for InQemu {
         Ok(qemu::version_of(core.emulator)?)
     }
 
-    fn build(&self, core: &Core, names: &[&str]) -> Result<(), ImagesError> {
-        Ok(emulated(core).build(names)?)
+    fn build(&self, core: &Core, names: &[&str], features: &str) -> Result<(), ImagesError> {
+        Ok(emulated(core).build(names, features)?)
     }
 
     fn path(&self, core: &Core, name: &str) -> PathBuf {

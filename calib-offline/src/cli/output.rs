@@ -70,8 +70,14 @@ impl Console {
     /// output, the words are narration.
     pub fn result(&self, words: &str, object: &impl Serialize) {
         let text = if self.settings.json {
-            // The objects are our own structs of strings and numbers.
-            serde_json::to_string_pretty(object).unwrap_or_default()
+            match serde_json::to_string_pretty(object) {
+                Ok(text) => text,
+                // The objects are our own structs; what JSON cannot say is a name that is not UTF-8.
+                Err(error) => {
+                    *self.lost.borrow_mut() = Some(error.into());
+                    return;
+                }
+            }
         } else {
             words.to_owned()
         };

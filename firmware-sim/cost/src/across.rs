@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::blobs::Asked;
 use crate::cores::Core;
-use crate::count::{COUNTING, cost_of_blob};
+use crate::count::{COUNTING, COUNTING_FEATURES, cost_of_blob};
 use crate::error::CostError;
 use crate::image::Image;
 use crate::images::Images;
@@ -69,7 +69,7 @@ fn cost_of_core(
     asked: &[Asked],
 ) -> Result<CoreCost, CostError> {
     let qemu = images.qemu_version(core)?;
-    images.build(core, &[COUNTING])?;
+    images.build(core, &[COUNTING], COUNTING_FEATURES)?;
     let image = Image::read(&images.path(core, COUNTING))?;
     let mut conditions = conditions(core, qemu, &image);
     let mut blobs = Vec::new();

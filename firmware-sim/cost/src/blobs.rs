@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use ray_runtime::format::Form;
+use ray_runtime::integer::Rig;
 use ray_runtime::{Camera, PixelPoint, Ray, RayBlob};
 use split_mix::SplitMix;
 
@@ -46,6 +47,8 @@ pub struct Asked {
     pub cameras: Vec<CameraCost>,
     /// Whether it carries the uncertainty of the two.
     pub has_uncertainty: bool,
+    /// Whether the arithmetic of integers can look it up.
+    pub has_integers: bool,
     /// What the flash is to hold: the blob and its job.
     pub flash: Vec<u8>,
 }
@@ -109,6 +112,7 @@ impl Asked {
                 .map(|(_, camera)| camera_cost(camera))
                 .collect(),
             has_uncertainty: uncertain.is_some(),
+            has_integers: Rig::<2>::prepare(blob).is_ok(),
             flash,
         })
     }

@@ -13,6 +13,8 @@ use crate::report::{BlobCost, Conditions, Row, Spread};
 
 /// Name of the image.
 pub const COUNTING: &str = "counting";
+/// What it is built with besides.
+pub const COUNTING_FEATURES: &str = "integer";
 /// Where the functions are that do the work.
 const PROBES: &str = "firmware_cost::probes";
 
@@ -57,6 +59,13 @@ pub fn cost_of_blob(
     for work in WORK {
         let is_asked = match work.probe {
             Probe::Covariance => asked.has_uncertainty,
+            Probe::IntegerPrepare | Probe::IntegerLookupFixedFirst | Probe::IntegerLookupFirst => {
+                asked.has_integers
+            }
+            Probe::IntegerLookupFixedSecond
+            | Probe::IntegerLookupSecond
+            | Probe::IntegerTriangulateFixed
+            | Probe::IntegerTriangulate => asked.has_integers && asked.cameras.len() > 1,
             Probe::LookupSecond
             | Probe::RowSecond
             | Probe::Triangulate
@@ -177,7 +186,7 @@ struct Work {
 }
 
 /// The rows of the table, in its order.
-const WORK: [Work; 12] = [
+const WORK: [Work; 19] = [
     Work::of_blob(Probe::Open, "open"),
     Work::of_blob(Probe::Checksum, "checksum"),
     Work::lookup(Probe::LookupFirst, "lookup_first", 0),
@@ -186,6 +195,33 @@ const WORK: [Work; 12] = [
     Work::row(Probe::RowSecond, "row_second", 1),
     Work::of_blob(Probe::Triangulate, "triangulate"),
     Work::of_blob(Probe::Covariance, "triangulate_with_covariance"),
+    Work::of_blob(Probe::IntegerPrepare, "integer_prepare"),
+    Work::integer_lookup(
+        Probe::IntegerLookupFixedFirst,
+        "integer_lookup_fixed",
+        "integer_lookup_fixed_first",
+        0,
+    ),
+    Work::integer_lookup(
+        Probe::IntegerLookupFixedSecond,
+        "integer_lookup_fixed",
+        "integer_lookup_fixed_second",
+        1,
+    ),
+    Work::integer_lookup(
+        Probe::IntegerLookupFirst,
+        "integer_lookup",
+        "integer_lookup_first",
+        0,
+    ),
+    Work::integer_lookup(
+        Probe::IntegerLookupSecond,
+        "integer_lookup",
+        "integer_lookup_second",
+        1,
+    ),
+    Work::of_blob(Probe::IntegerTriangulateFixed, "integer_triangulate_fixed"),
+    Work::of_blob(Probe::IntegerTriangulate, "integer_triangulate"),
     Work::yardstick(Probe::BilinearLookup, "bilinear_lookup"),
     Work::yardstick(Probe::BrownUndistortion, "brown_undistortion"),
     Work::yardstick(Probe::BilinearTriangulate, "bilinear_triangulate"),
@@ -209,6 +245,18 @@ impl Work {
             function,
             camera: Some(camera),
             ..Self::of_blob(probe, "lookup")
+        }
+    }
+
+    const fn integer_lookup(
+        probe: Probe,
+        name: &'static str,
+        function: &'static str,
+        camera: usize,
+    ) -> Self {
+        Self {
+            name,
+            ..Self::lookup(probe, function, camera)
         }
     }
 

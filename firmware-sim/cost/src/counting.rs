@@ -43,6 +43,20 @@ pub enum Probe {
     RowFirst,
     /// The same in the second camera.
     RowSecond,
+    /// `integer::Rig::prepare`.
+    IntegerPrepare,
+    /// `integer::Rig::lookup_fixed` in the first camera of the match.
+    IntegerLookupFixedFirst,
+    /// The same in the second camera.
+    IntegerLookupFixedSecond,
+    /// `integer::Rig::lookup`, the same from f32 to f32, in the first camera.
+    IntegerLookupFirst,
+    /// The same in the second camera.
+    IntegerLookupSecond,
+    /// `integer::Rig::triangulate_fixed`.
+    IntegerTriangulateFixed,
+    /// `integer::Rig::triangulate`, the same from f32 to f32.
+    IntegerTriangulate,
 }
 
 /// Pixels of a row.
@@ -53,7 +67,7 @@ pub const KNOWN_INSTRUCTIONS: u32 = 100;
 
 impl Probe {
     /// All of them.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 21] = [
         Self::Nothing,
         Self::Known,
         Self::Open,
@@ -68,13 +82,20 @@ impl Probe {
         Self::BrownTriangulate,
         Self::RowFirst,
         Self::RowSecond,
+        Self::IntegerPrepare,
+        Self::IntegerLookupFixedFirst,
+        Self::IntegerLookupFixedSecond,
+        Self::IntegerLookupFirst,
+        Self::IntegerLookupSecond,
+        Self::IntegerTriangulateFixed,
+        Self::IntegerTriangulate,
     ];
 
     /// Whether it depends on the pixels, and is run for every match. The others are run once.
     pub const fn is_per_match(self) -> bool {
         !matches!(
             self,
-            Self::Nothing | Self::Known | Self::Open | Self::Checksum
+            Self::Nothing | Self::Known | Self::Open | Self::Checksum | Self::IntegerPrepare
         )
     }
 }

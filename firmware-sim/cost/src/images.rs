@@ -17,11 +17,12 @@ pub trait Images {
     /// If it is not installed.
     fn qemu_version(&self, core: &Core) -> Result<String, ImagesError>;
 
-    /// Builds the images of these names for a core if they are missing or stale.
+    /// Builds the images of these names with these features besides, separated by commas, for a core if they are
+    /// missing or stale.
     ///
     /// # Errors
     /// If that fails, or there is nothing to build them with.
-    fn build(&self, core: &Core, names: &[&str]) -> Result<(), ImagesError>;
+    fn build(&self, core: &Core, names: &[&str], features: &str) -> Result<(), ImagesError>;
 
     /// Where the image of this name is once it has been built.
     fn path(&self, core: &Core, name: &str) -> PathBuf;

@@ -2,6 +2,7 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 
 pub mod counting;
+#[cfg(feature = "integer")]
 pub mod probes;
 pub mod same_bits;
 pub mod yardstick;

@@ -4,6 +4,7 @@
 use core::cell::RefCell;
 use core::hint::black_box;
 
+use ray_runtime::integer::{FixedPixel, Rig};
 use ray_runtime::{PixelPoint, Ray, RayBlob, Row, format, triangulate_pair};
 
 use crate::counting::{Job, Probe, ROW_LEN, Record, WRAPPED, job_start};
@@ -16,6 +17,9 @@ pub struct Task<'a> {
     job: Job<'a>,
     cameras: [usize; 2],
     pixels: [PixelPoint; 2],
+    /// What the arithmetic of integers works on; `None` of a blob that it cannot look up.
+    integers: Option<Rig<'a, 2>>,
+    fixed: [FixedPixel; 2],
     rays: RefCell<[Ray; ROW_LEN]>,
 }
 
@@ -44,16 +48,20 @@ pub fn run<M: Machine>(machine: &mut M, flash: &[u8]) -> Option<()> {
     let bytes = flash.get(..blob_len)?;
     let numbers = bytemuck::try_cast_slice(flash.get(job_start(blob_len)..)?).ok()?;
     let job = Job::read(numbers)?;
+    let blob = RayBlob::open(bytes).ok()?;
     let mut task = Task {
         bytes,
-        blob: RayBlob::open(bytes).ok()?,
+        integers: Rig::prepare(&blob).ok(),
+        blob,
         job,
         cameras: job.cameras,
         pixels: [PixelPoint::new(0.0, 0.0); 2],
+        fixed: [FixedPixel { u: 0, v: 0 }; 2],
         rays: RefCell::new([Ray::OUTSIDE; ROW_LEN]),
     };
     for (match_idx, [u1, v1, u2, v2]) in job.matches.iter().enumerate() {
         task.pixels = [PixelPoint::new(*u1, *v1), PixelPoint::new(*u2, *v2)];
+        task.fixed = task.pixels.map(fixed);
         for probe in Probe::ALL {
             if match_idx > 0 && !probe.is_per_match() {
                 continue;
@@ -109,6 +117,13 @@ fn work<M: Machine>(probe: Probe) -> Work {
         Probe::BrownTriangulate => brown_triangulate,
         Probe::RowFirst => row_first,
         Probe::RowSecond => row_second,
+        Probe::IntegerPrepare => integer_prepare,
+        Probe::IntegerLookupFixedFirst => integer_lookup_fixed_first,
+        Probe::IntegerLookupFixedSecond => integer_lookup_fixed_second,
+        Probe::IntegerLookupFirst => integer_lookup_first,
+        Probe::IntegerLookupSecond => integer_lookup_second,
+        Probe::IntegerTriangulateFixed => integer_triangulate_fixed,
+        Probe::IntegerTriangulate => integer_triangulate,
     })
 }
 
@@ -197,6 +212,65 @@ fn row(task: &Task<'_>, camera: usize) -> bool {
     let found = task.blob.lookup_row(task.cameras[camera], &row, &mut *rays);
     written(&*rays);
     found.is_ok()
+}
+
+fn integer_prepare(task: &Task<'_>) -> bool {
+    written(&Rig::<2>::prepare(&task.blob)).is_ok()
+}
+
+fn integer_lookup_fixed_first(task: &Task<'_>) -> bool {
+    integer_lookup_fixed(task, 0)
+}
+
+fn integer_lookup_fixed_second(task: &Task<'_>) -> bool {
+    integer_lookup_fixed(task, 1)
+}
+
+#[inline(always)]
+fn integer_lookup_fixed(task: &Task<'_>, camera: usize) -> bool {
+    let Some(rig) = &task.integers else {
+        return false;
+    };
+    written(&rig.lookup_fixed(task.cameras[camera], task.fixed[camera])).is_ok()
+}
+
+fn integer_lookup_first(task: &Task<'_>) -> bool {
+    integer_lookup(task, 0)
+}
+
+fn integer_lookup_second(task: &Task<'_>) -> bool {
+    integer_lookup(task, 1)
+}
+
+#[inline(always)]
+fn integer_lookup(task: &Task<'_>, camera: usize) -> bool {
+    let Some(rig) = &task.integers else {
+        return false;
+    };
+    written(&rig.lookup(task.cameras[camera], task.pixels[camera])).is_ok()
+}
+
+fn integer_triangulate_fixed(task: &Task<'_>) -> bool {
+    let Some(rig) = &task.integers else {
+        return false;
+    };
+    let [a, b] = task.fixed;
+    let [first, second] = task.cameras;
+    written(&rig.triangulate_fixed((first, a), (second, b))).is_ok()
+}
+
+fn integer_triangulate(task: &Task<'_>) -> bool {
+    let Some(rig) = &task.integers else {
+        return false;
+    };
+    let [a, b] = sightings(task);
+    written(&rig.triangulate(a, b)).is_ok()
+}
+
+/// Rounded down; only pixels of sensors are asked.
+fn fixed(pixel: PixelPoint) -> FixedPixel {
+    let [u, v] = [pixel.u, pixel.v].map(|px| (px * 65536.0) as i32);
+    FixedPixel { u, v }
 }
 
 fn sightings(task: &Task<'_>) -> [(usize, PixelPoint); 2] {

@@ -180,22 +180,31 @@ impl AcrossCores {
         };
         for (number, blob) in first.blobs.iter().enumerate() {
             heading(text, style, &heading_of(blob));
-            let mut table = Table::new(&ACROSS.map(|(_, head)| head));
-            for core in &self.cores {
-                let Some(blob) = core.blobs.get(number) else {
-                    continue;
-                };
-                let means = means(blob);
-                let cell = |(work, _): (&str, &str)| match work {
-                    "" => core.core.to_owned(),
-                    work => means
-                        .get(work)
-                        .map_or("-".to_owned(), |mean| format!("{mean:.0}")),
-                };
-                table.rows.push(ACROSS.map(cell).to_vec());
+            for columns in [&ACROSS, &ACROSS_INTEGERS] {
+                let table = self.table(number, columns);
+                let _ = writeln!(text, "{}", table.drawn(style));
             }
-            let _ = writeln!(text, "{}", table.drawn(style));
         }
+    }
+
+    /// A row for each core, of the blob of this number.
+    fn table(&self, number: usize, columns: &[(&str, &str)]) -> Table {
+        let heads: Vec<&str> = columns.iter().map(|(_, head)| *head).collect();
+        let mut table = Table::new(&heads);
+        for core in &self.cores {
+            let Some(blob) = core.blobs.get(number) else {
+                continue;
+            };
+            let means = means(blob);
+            let cell = |(work, _): &(&str, &str)| match *work {
+                "" => core.core.to_owned(),
+                work => means
+                    .get(work)
+                    .map_or("-".to_owned(), |mean| format!("{mean:.0}")),
+            };
+            table.rows.push(columns.iter().map(cell).collect());
+        }
+        table
     }
 }
 
@@ -208,6 +217,17 @@ const ACROSS: [(&str, &str); 7] = [
     ("triangulate_with_covariance", "with covariance"),
     ("open", "open"),
     ("bilinear_triangulate", "yardstick: bilinear triangulate"),
+];
+
+/// The same of points in integers, beside those in f32.
+const ACROSS_INTEGERS: [(&str, &str); 7] = [
+    ("", "in integers"),
+    ("triangulate", "triangulate in f32"),
+    ("integer_triangulate", "triangulate from f32 to f32"),
+    ("integer_triangulate_fixed", "in fixed point"),
+    ("integer_lookup", "lookup from f32 to f32"),
+    ("integer_lookup_fixed", "in fixed point"),
+    ("integer_prepare", "prepare, once"),
 ];
 
 fn heading(text: &mut String, style: Style, heading: &str) {

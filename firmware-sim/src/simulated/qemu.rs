@@ -166,7 +166,7 @@ impl Drop for QemuDevice {
 /// # Errors
 /// [`QemuError`]; what to install if there is no toolchain is said on standard error.
 pub fn build_image(image: &str) -> Result<PathBuf, QemuError> {
-    DEVICE.build(&[image])?;
+    DEVICE.build(&[image], "")?;
     Ok(DEVICE.image_path(image))
 }
 

@@ -52,7 +52,10 @@ fn counts_are_exact_and_the_same_in_every_run() {
         assert!(blob["matches"].as_u64().unwrap() >= 64);
         assert_eq!(rows(blob, "lookup").count(), 2);
         for row in blob["rows"].as_array().unwrap() {
-            let is_per_match = !matches!(row["work"].as_str(), Some("open" | "checksum"));
+            let is_per_match = !matches!(
+                row["work"].as_str(),
+                Some("open" | "checksum" | "integer_prepare")
+            );
             let runs = row["runs"].as_u64().unwrap();
             assert!(
                 runs > 0 && (row["is_yardstick"] == true || !is_per_match || runs == 64),
@@ -71,12 +74,20 @@ fn counts_are_exact_and_the_same_in_every_run() {
         assert!(most(blob, "checksum") < most(blob, "open"));
         assert!(most(blob, "bilinear_lookup") < most(blob, "bilinear_triangulate"));
         assert!(most(blob, "brown_undistortion") < most(blob, "brown_triangulate"));
+        if rows(blob, "integer_triangulate").next().is_some() {
+            assert!(most(blob, "integer_lookup_fixed") < most(blob, "integer_triangulate_fixed"));
+            assert!(most(blob, "integer_triangulate_fixed") < most(blob, "integer_triangulate"));
+        }
         if rows(blob, "triangulate_with_covariance").next().is_some() {
             assert!(most(blob, "triangulate") < most(blob, "triangulate_with_covariance"));
         }
         // A table-driven CRC-32 takes at least a load, a shift, an index and an exclusive or.
         assert!(blob["checksum_instructions_per_byte"].as_f64().unwrap() >= 4.0);
     }
+    let integers = blobs
+        .iter()
+        .flat_map(|blob| rows(blob, "integer_triangulate"));
+    assert!(integers.count() > 0, "no blob was counted in integers");
     let covariances = blobs
         .iter()
         .flat_map(|blob| rows(blob, "triangulate_with_covariance"));
@@ -161,13 +172,40 @@ fn cores_of_another_target_are_counted_beside_their_conditions() {
     let [blob] = core["blobs"].as_array().unwrap().as_slice() else {
         panic!("not one blob: {across}");
     };
-    // Emulated numbers cost much more than those of an FPU, which takes 485.
+    // Emulated numbers cost much more than those of an FPU, which takes 387.
     let triangulate = most(blob, "triangulate");
     assert!((10_000..20_000).contains(&triangulate), "{triangulate}");
     assert!(most(blob, "lookup") < triangulate);
     let text = String::from_utf8(run(&arguments).stdout).unwrap();
     let line = text.lines().find(|line| line.contains("Cortex-M3  "));
     assert!(line.is_some() && text.contains("mps2-an385"), "{text}");
+}
+
+/// Both by code of the Cortex-M0, of the same pixels.
+#[test]
+fn points_in_integers_take_an_eighth_of_those_in_f32_without_a_floating_point_unit_or_less() {
+    let golden = |name: &str| root().join("data/golden").join(name).display().to_string();
+    let [patches, quantized] = ["central-v3-fast.rays", "non-central-v3-cubic.rays"].map(golden);
+    let across = counted(&[
+        "--target",
+        "thumbv6m-none-eabi",
+        "--blob",
+        &patches,
+        "--blob",
+        &quantized,
+    ]);
+    let blobs = across["cores"][0]["blobs"].as_array().unwrap();
+    assert_eq!(blobs.len(), 2);
+    for blob in blobs {
+        let [fixed, from_f32, f32_alone] = [
+            "integer_triangulate_fixed",
+            "integer_triangulate",
+            "triangulate",
+        ]
+        .map(|work| most(blob, work));
+        assert!(fixed > 1000 && 8 * fixed <= f32_alone, "{blob}");
+        assert!(from_f32 > fixed && 8 * from_f32 <= f32_alone, "{blob}");
+    }
 }
 
 #[test]

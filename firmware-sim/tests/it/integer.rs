@@ -190,30 +190,6 @@ fn integers_give_the_same_bits_on_the_host_a_cortex_m4f_and_a_core_without_a_flo
     }
 }
 
-/// Code of the Cortex-M0, on a core that runs the same instructions beside a `SysTick` of 25 MHz.
-#[test]
-fn points_in_integers_take_a_tenth_of_the_instructions_of_f32_in_software() {
-    let counts = printed(
-        "counting_integer",
-        "thumbv6m-none-eabi",
-        ["mps2-an385", "cortex-m3"],
-    );
-    for (name, most) in [
-        ("central-v3-fast", 2500),
-        ("non-central-v3-fast", 4000),
-        ("non-central-v3-cubic", 4400),
-        ("non-central-v3-small", 10_500),
-    ] {
-        let line = counts.lines().find(|line| line.starts_with(name)).unwrap();
-        let mut numbers = line
-            .split(' ')
-            .skip(1)
-            .map(|word| word.parse::<u32>().unwrap());
-        let [matches, _, point] = [0; 3].map(|_| numbers.next().unwrap());
-        assert!(matches > 10 && point <= most && point > 1000, "{line}");
-    }
-}
-
 /// It links only if no panic is reachable.
 #[test]
 fn no_panic_is_reachable_in_integers() {

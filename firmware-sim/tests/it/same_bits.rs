@@ -48,7 +48,7 @@ fn on(core: &Emulated<'_>, blob: &Path) -> Digest {
 
 #[test]
 fn host_and_cortex_m4f_answer_the_same_bits() {
-    DEVICE.build(&[IMAGE]).unwrap();
+    DEVICE.build(&[IMAGE], "").unwrap();
     for blob in blobs() {
         let host = on_host(&blob);
         // A fifth of the pairs see something in front of both cameras.
@@ -59,7 +59,7 @@ fn host_and_cortex_m4f_answer_the_same_bits() {
 
 #[test]
 fn without_a_floating_point_unit_the_bits_are_the_same() {
-    SOFT_FLOAT.build(&[IMAGE]).unwrap();
+    SOFT_FLOAT.build(&[IMAGE], "").unwrap();
     let blobs = blobs();
     // By far the longest of these tests: half of the blobs beside the others.
     let (first, second) = blobs.split_at(blobs.len() / 2);

@@ -49,12 +49,13 @@ pub const SOFT_FLOAT: Emulated<'_> = Emulated {
 };
 
 impl Emulated<'_> {
-    /// Builds the images of these names if they are missing or stale, in one go.
+    /// Builds the images of these names with these features besides, separated by commas, if they are missing or
+    /// stale, in one go.
     ///
     /// # Errors
     /// [`QemuError`]; what to install if there is no toolchain is said on standard error.
-    pub fn build(&self, images: &[&str]) -> Result<(), QemuError> {
-        self.build_with(images, &[], &[])
+    pub fn build(&self, images: &[&str], features: &str) -> Result<(), QemuError> {
+        self.build_with(images, &["--features", features], &[])
     }
 
     /// The same with further arguments and environment.
