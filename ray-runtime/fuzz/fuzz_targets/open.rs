@@ -102,10 +102,7 @@ fn ask_everything(blob: &RayBlob<'_>) {
         assert_eq!(point.is_ok(), measured.is_ok());
         if let (Ok(point), Ok(measured)) = (point, measured) {
             let bits = |x: [f32; 3]| x.map(f32::to_bits);
-            assert_eq!(
-                bits(point.point_mm),
-                bits(measured.found.point_mm)
-            );
+            assert_eq!(bits(point.point_mm), bits(measured.found.point_mm));
             let _ = measured.covariance.map(|covariance| covariance.sigma_mm());
             // What a request says of the noise in place of the blob: the same bits if it says the same.
             if let Some(noise) = blob.match_noise() {

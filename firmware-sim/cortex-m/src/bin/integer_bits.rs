@@ -65,7 +65,11 @@ fn answer(output: &mut HostStream, bytes: &[u8]) -> Option<()> {
 
 const fn hex_digit(value: u32) -> u8 {
     let value = value as u8;
-    if value < 10 { b'0' + value } else { b'a' + value - 10 }
+    if value < 10 {
+        b'0' + value
+    } else {
+        b'a' + value - 10
+    }
 }
 
 #[panic_handler]
