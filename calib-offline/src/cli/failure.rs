@@ -2,7 +2,7 @@
 
 use super::error::Error;
 use super::output::{Console, Paint};
-use super::settings::{Narration, Settings};
+use super::settings::{Narration, Settings, Words};
 use calib_judge::Cause;
 use calib_rays::remedy::Remedy;
 use serde::Serialize;
@@ -77,7 +77,7 @@ pub(super) fn of_arguments(
             narration: Narration::Errors,
             color: false,
             bars: false,
-            file_on_stdout: false,
+            words: Words::StandardOutput,
         });
         let object = ErrorObject {
             schema: SCHEMA,

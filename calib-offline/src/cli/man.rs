@@ -72,18 +72,18 @@ pub fn run(args: &ManArgs, program: Command, console: &Console) -> Result<Outcom
 fn pages(mut program: Command) -> std::io::Result<Vec<(String, Vec<u8>)>> {
     // So that each verb has the options that hold for all.
     program.build();
-    let mut pages = vec![page(program.clone(), "calib-offline".to_owned())?];
+    let mut pages = vec![page(program.clone(), "calib-offline")?];
     for verb in program
         .get_subcommands()
         .filter(|verb| verb.get_name() != "help")
     {
         let name = format!("calib-offline-{}", verb.get_name());
-        pages.push(page(verb.clone().display_name(name.clone()), name)?);
+        pages.push(page(verb.clone().display_name(name.clone()), &name)?);
     }
     Ok(pages)
 }
 
-fn page(command: Command, name: String) -> std::io::Result<(String, Vec<u8>)> {
+fn page(command: Command, name: &str) -> std::io::Result<(String, Vec<u8>)> {
     let mut page = Vec::new();
     clap_mangen::Man::new(command)
         .title(name.to_uppercase())

@@ -2,7 +2,7 @@
 //! reader that has gone away is no error.
 
 use super::progress::Bars;
-use super::settings::{Narration, Settings};
+use super::settings::{Narration, Settings, Words};
 use calib_rays::progress::Progress;
 use serde::Serialize;
 use std::cell::RefCell;
@@ -82,7 +82,7 @@ impl Console {
             words.to_owned()
         };
         let text = text.trim_end_matches('\n');
-        if self.settings.file_on_stdout {
+        if self.settings.words == Words::BesideFile {
             return self.narrate(text);
         }
         let mut stdout = std::io::stdout().lock();

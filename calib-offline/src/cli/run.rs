@@ -4,7 +4,7 @@ use super::args::{Cli, Verb};
 use super::error::Error;
 use super::outcome::Outcome;
 use super::output::Console;
-use super::settings::Settings;
+use super::settings::{Settings, Words};
 use super::usage_error::UsageError;
 use super::{
     audit, calibrate, compare, completions, demo, device, evaluate, export, failure, flash, import,
@@ -35,7 +35,12 @@ pub fn main() -> ExitCode {
         Err(error) => return failure::of_arguments(&error, std::env::args_os()),
     };
     let is_one_too_many = file_on_stdout && cli.common.json;
-    let settings = Settings::resolve(&cli.common, file_on_stdout && !is_one_too_many);
+    let words = if file_on_stdout && !is_one_too_many {
+        Words::BesideFile
+    } else {
+        Words::StandardOutput
+    };
+    let settings = Settings::resolve(&cli.common, words);
     let console = Console::new(settings);
     if is_one_too_many {
         let error = Error::Usage(UsageError::TwoOnStandardOutput);

@@ -53,8 +53,17 @@ pub struct Settings {
     pub color: bool,
     /// Whether standard error is a terminal that can show moving bars.
     pub bars: bool,
-    /// Whether the command's file itself goes to standard output, so that its words go elsewhere.
-    pub file_on_stdout: bool,
+    /// Where the words of a result go.
+    pub words: Words,
+}
+
+/// Where the words of a result go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Words {
+    /// To standard output.
+    StandardOutput,
+    /// To standard error: the command's file itself goes to standard output.
+    BesideFile,
 }
 
 /// How much is said on standard error.
@@ -69,13 +78,13 @@ pub enum Narration {
 }
 
 impl Settings {
-    /// The settings of this process; `file_on_stdout` as of the field.
-    pub fn resolve(common: &CommonArgs, file_on_stdout: bool) -> Self {
+    /// The settings of this process; where the words of its result go.
+    pub fn resolve(common: &CommonArgs, words: Words) -> Self {
         let terminal = std::io::stderr().is_terminal();
         let set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
         let dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
         Self {
-            file_on_stdout,
+            words,
             ..Self::from_facts(common, terminal && !dumb, set("NO_COLOR"))
         }
     }
@@ -95,7 +104,7 @@ impl Settings {
                 ColorChoice::Auto => terminal && !no_color,
             },
             bars: terminal && narration > Narration::Errors,
-            file_on_stdout: false,
+            words: Words::StandardOutput,
         }
     }
 }

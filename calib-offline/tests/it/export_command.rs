@@ -201,6 +201,7 @@ fn what_a_reader_of_the_file_should_know_is_said() {
     );
 }
 
+#[allow(clippy::too_many_lines, reason = "a table")]
 #[test]
 fn wrong_requests_write_nothing() {
     let (folder, blob) = folder();

@@ -99,9 +99,7 @@ fn a_reader_that_has_read_enough_is_no_error() {
     let folder = folder();
     let path = folder.path();
     let mut long = String::from("id,u_left,v_left,u_right,v_right\n");
-    for k in 0..20_000 {
-        long += &format!("p{k},320,240,300,240\n");
-    }
+    long.extend((0..20_000).map(|k| format!("p{k},320,240,300,240\n")));
     fs::write(path.join("matches.csv"), long).unwrap();
     let mut child = Command::new(env!("CARGO_BIN_EXE_calib-offline"))
         .current_dir(path)

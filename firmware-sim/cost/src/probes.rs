@@ -226,6 +226,8 @@ fn integer_lookup_fixed_second(task: &Task<'_>) -> bool {
     integer_lookup_fixed(task, 1)
 }
 
+// As with rows.
+#[allow(clippy::inline_always)]
 #[inline(always)]
 fn integer_lookup_fixed(task: &Task<'_>, camera: usize) -> bool {
     let Some(rig) = &task.integers else {
@@ -242,6 +244,8 @@ fn integer_lookup_second(task: &Task<'_>) -> bool {
     integer_lookup(task, 1)
 }
 
+// As with rows.
+#[allow(clippy::inline_always)]
 #[inline(always)]
 fn integer_lookup(task: &Task<'_>, camera: usize) -> bool {
     let Some(rig) = &task.integers else {

@@ -1,5 +1,5 @@
 use super::*;
-use crate::cli::settings::{Narration, Settings};
+use crate::cli::settings::{Narration, Settings, Words};
 use crate::cli::usage_error::UsageError;
 use crate::report::example;
 use calib_recording::dataset::{CornersError, SufficiencyError};
@@ -11,7 +11,7 @@ fn console() -> Console {
         narration: Narration::Errors,
         color: false,
         bars: false,
-        file_on_stdout: false,
+        words: Words::StandardOutput,
     })
 }
 
