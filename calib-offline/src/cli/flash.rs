@@ -144,7 +144,11 @@ fn usual_manifest(args: &FlashArgs, client: &mut DeviceClient) -> Result<Manifes
     }))
 }
 
-fn read_manifest(file: &Path) -> Result<ManifestBytes, Error> {
+/// The manifest in a file.
+///
+/// # Errors
+/// [`UsageError::UnknownKind`] where it holds none, and where it cannot be read.
+pub(super) fn read_manifest(file: &Path) -> Result<ManifestBytes, Error> {
     let bytes = key_file::read(file)?;
     let bytes = bytes.try_into().ok();
     let manifest = bytes.filter(|bytes: &ManifestBytes| Manifest::parse(bytes).is_ok());

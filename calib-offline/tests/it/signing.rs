@@ -316,6 +316,74 @@ fn what_cannot_be_signed_is_said_and_nothing_is_written() {
     }
 }
 
+/// The image of a slot takes the manifest of its blob and its rig, and no other file.
+#[test]
+fn a_slot_image_takes_only_its_own_manifest() {
+    let folder = folder();
+    let path = folder.path();
+    let sign = |rig: &str, serial: &[&str]| {
+        let sign = ["sign", rig, "--key", "zero.pem", "--version", "3"];
+        run(path, &[&sign[..], serial].concat()).assert_code(0);
+    };
+    sign("small.rays", &["--serial", "R 7"]);
+    sign("fast.rays", &[]);
+    let before = contents(path);
+    let image = |options: &[&str]| {
+        let export = ["export", "small.rays", "--format", "slot-image"];
+        let part = ["--part", "rp2040", "--region-address", "0x10100000"];
+        let rest = ["--region-size", "0x20000", "-o", "slot.hex"];
+        run(path, &[&export[..], &part, &rest, options].concat())
+    };
+    let own = ["--manifest", "small.rays.manifest"];
+    for (options, said) in [
+        (
+            &["--manifest", "zero.pem"][..],
+            &["zero.pem: is not a manifest as calib-offline sign writes it"][..],
+        ),
+        (
+            &["--manifest", "fast.rays.manifest"],
+            &[
+                "fast.rays.manifest: ",
+                "not of this blob",
+                "calib-offline sign",
+            ],
+        ),
+        (
+            &own,
+            &[
+                "small.rays.manifest: ",
+                "rig \"R 7\" only",
+                "no serial number",
+                "--serial \"R 7\"",
+            ],
+        ),
+        (
+            &[own[0], own[1], "--serial", "R 8"],
+            &[
+                "small.rays.manifest: ",
+                "serial number \"R 8\"",
+                "--any-rig",
+            ],
+        ),
+        (
+            &[
+                own[0],
+                own[1],
+                "--serial",
+                "R 7",
+                "-o",
+                "small.rays.manifest",
+                "--force",
+            ],
+            &["small.rays.manifest"],
+        ),
+    ] {
+        image(options).assert_code(2).assert_says(said);
+        assert_eq!(contents(path), before, "{options:?}");
+    }
+    image(&[own[0], own[1], "--serial", "R 7"]).assert_code(0);
+}
+
 /// Runs openssl in a folder; `None`, and a loud line, where there is none.
 fn openssl(path: &Path, arguments: &str) -> Option<bool> {
     let arguments = arguments.split(' ');
