@@ -282,7 +282,7 @@ impl Remedy for UsageError {
                 "calib-offline device status shows the first digits of its keys"
             }
             Self::NotSigned { command, .. } => return Some(command.clone()),
-            Self::OutputIsInput { .. } => "choose another place with -o",
+            Self::OutputIsInput { .. } => "choose another place for what it writes",
         };
         Some(text.to_owned())
     }
