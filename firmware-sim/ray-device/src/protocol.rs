@@ -24,7 +24,7 @@ pub use crate::manifest::Signature;
 pub use name::{MAX_NAME, Name, name};
 pub use owner::{Claims, KeyId, Order, OwnerStatus};
 pub use refusal::{FlashOperation, Refusal, RigPart};
-pub use unusable::{Distrust, OTHER_PART};
+pub use unusable::{Distrust, OTHER_PART, OTHER_PART_WORDS};
 
 /// The protocol spoken here. It stands in every frame, and a device refuses any other.
 pub const PROTOCOL_VERSION: u8 = 4;
