@@ -293,7 +293,7 @@ pub struct Hello {
     pub max_chunk: u16,
     /// Longest blob that a slot of its flash holds, bytes.
     pub max_blob: u32,
-    /// What its flash programs in one go, bytes: a power of two from 8 to [`MAX_CHUNK`].
+    /// What its flash programs in one go, bytes: a power of two from 1 to [`MAX_CHUNK`].
     pub unit: u16,
     /// Whether it has an owner, and so takes signed blobs only.
     pub needs_signature: bool,
