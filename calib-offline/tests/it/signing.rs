@@ -331,9 +331,10 @@ fn a_slot_image_takes_only_its_own_manifest() {
     let image = |options: &[&str]| {
         let export = ["export", "small.rays", "--format", "slot-image"];
         let part = ["--part", "rp2040", "--region-address", "0x10100000"];
-        let rest: &[&str] = match options.contains(&"-o") {
-            true => &["--region-size", "0x20000"],
-            false => &["--region-size", "0x20000", "-o", "slot.hex"],
+        let rest: &[&str] = if options.contains(&"-o") {
+            &["--region-size", "0x20000"]
+        } else {
+            &["--region-size", "0x20000", "-o", "slot.hex"]
         };
         run(path, &[&export[..], &part, rest, options].concat())
     };
