@@ -4,11 +4,13 @@
 mod parts;
 
 use ray_device::frame::checksum;
+use ray_device::manifest::{Manifest, root};
 use ray_device::port::NoClock;
 use ray_device::protocol::{CameraStatus, MAX_CAMERAS_LISTED, MAX_NAME, Refusal, Rig, name};
 use ray_device::storage::log::Log;
 use ray_device::storage::record::Record;
 use ray_device::storage::slot::SlotFlash;
+use ray_device::storage::trust::Claims;
 use ray_device::storage::{program_blob, program_manifest, rig};
 use ray_runtime::RayBlob;
 use thiserror::Error;
@@ -31,7 +33,8 @@ pub struct SlotImageOptions<'a> {
     /// The serial number for a factory record that names the blob's cameras as the device's own, so that it takes no
     /// blob for others; `None` for no record.
     pub serial: Option<&'a str>,
-    /// The owner's manifest behind the blob; empty for a device without an owner.
+    /// The owner's manifest behind the blob; empty for a device without an owner. Its signature is not verified here, as
+    /// the device's keys are not known: the device does that when it starts.
     pub manifest: &'a [u8],
 }
 
@@ -111,6 +114,23 @@ pub enum SlotImageError {
         "a factory record holds {MAX_CAMERAS_LISTED} cameras, and names and a serial number of {MAX_NAME} bytes, at most"
     )]
     NoRecord,
+    /// The bytes are no manifest.
+    #[error("this is no manifest of an owner")]
+    NotAManifest,
+    /// The manifest was signed for another blob.
+    #[error("this manifest is not of this blob")]
+    OtherManifest,
+    /// The manifest was signed for one rig, and the device is to be another, or none.
+    #[error(
+        "this manifest is for rig {signed:?} only, and the device {}",
+        .own.as_ref().map_or("gets no serial number".to_owned(), |own| format!("gets the serial number {own:?}"))
+    )]
+    OtherSerial {
+        /// The one in the manifest.
+        signed: String,
+        /// The one of the factory record, if one is written.
+        own: Option<String>,
+    },
     /// The storage refused.
     #[error("the storage refused: {0}")]
     Storage(Refusal),
@@ -129,6 +149,7 @@ pub fn slot_image(
     let (copy, _) = bytemuck::cast_slice_mut(&mut words).split_at_mut(blob.len());
     copy.copy_from_slice(blob);
     let opened = RayBlob::open(copy).map_err(SlotImageError::Blob)?;
+    let claims = claims_of(blob, *opened.identity(), options)?;
     let slot_at = flash.areas().slots + options.slot * flash.areas().slot;
     let mut regions = flash.regions();
     if let Some(serial) = options.serial {
@@ -151,7 +172,7 @@ pub fn slot_image(
         length: blob.len() as u32,
         checksum: checksum(blob),
         manifest_length: options.manifest.len() as u32,
-        ..Record::default()
+        claims,
     };
     program_blob(slot, 0, blob, &mut NoClock)
         .and_then(|()| program_manifest(slot, record.length, options.manifest, &mut NoClock))
@@ -159,6 +180,32 @@ pub fn slot_image(
         .map_err(SlotImageError::Storage)?;
     let blob_address = options.region_address + slot_at as u32 + slot.shape().blob_start();
     Ok(image(options, blob_address, &flash))
+}
+
+/// What a device claims that has taken this blob with its manifest, as if it had been sent.
+fn claims_of(
+    blob: &[u8],
+    identity: [u8; 16],
+    options: &SlotImageOptions<'_>,
+) -> Result<Claims, SlotImageError> {
+    if options.manifest.is_empty() {
+        return Ok(Claims::default());
+    }
+    let (manifest, _) =
+        Manifest::parse(options.manifest).map_err(|_| SlotImageError::NotAManifest)?;
+    let signed = (manifest.length, manifest.checksum, manifest.identity);
+    let is_of_it = signed == (blob.len() as u32, checksum(blob), identity)
+        && manifest.root == root(blob, || ());
+    if !is_of_it {
+        return Err(SlotImageError::OtherManifest);
+    }
+    match manifest.rig_serial.as_deref() {
+        Some(signed) if options.serial != Some(signed) => Err(SlotImageError::OtherSerial {
+            signed: signed.to_owned(),
+            own: options.serial.map(str::to_owned),
+        }),
+        _ => Ok(Claims::default().after(&manifest)),
+    }
 }
 
 /// The blob's cameras as a device's own.

@@ -10,7 +10,7 @@ use calib_recording::dataset::identity::hex;
 use clap::{Args, Subcommand};
 use firmware_sim::client::{ClientError, DeviceClient};
 use ray_device::manifest::{Action, OrderText};
-use ray_device::protocol::{Order, Refusal, SlotState};
+use ray_device::protocol::{Arithmetic, Order, Refusal, SlotState};
 use ray_device::storage::trust::KeyId;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -33,7 +33,8 @@ rollback  the blob in the other slot, after a check of all of it, becomes the on
           owner does so only on an order that is signed with --key, for this device and this moment
 abort     an update that is under way is given up, on a device with an owner with --key
 
-Exit code 1: the gaps say that the cameras have moved, or a self-test gave other bits.
+Exit code 1: the gaps say that the cameras have moved, or a self-test gave other bits. Exit code 3: the blob
+states no self-tests for what the device computes in.
 
 With --json, status, schema calib-offline/device-status/1:
   device, firmware, uptime_ms, answered, refused, updates, rollbacks, max_blob_bytes
@@ -170,7 +171,10 @@ fn selftest(client: &mut DeviceClient, console: &Console) -> Result<Outcome, Err
         worst_direction: report.worst_direction,
     };
     let is_equal = report.equal == report.tests;
-    let words = if is_equal {
+    let words = if report.tests == 0 {
+        let status = client.status().map_err(DeviceError::Client)?;
+        no_self_tests(status.arithmetic)
+    } else if is_equal {
         format!(
             "all {} self-tests gave the bits of the host that packed the blob",
             report.tests
@@ -187,7 +191,24 @@ fn selftest(client: &mut DeviceClient, console: &Console) -> Result<Outcome, Err
         )
     };
     console.result(&words, &object);
-    Ok(outcome(is_equal))
+    Ok(match report.tests {
+        0 => Outcome::Undetermined,
+        _ => outcome(is_equal),
+    })
+}
+
+/// That nothing was tested, and what to do.
+fn no_self_tests(arithmetic: Arithmetic) -> String {
+    match arithmetic {
+        Arithmetic::Integer => {
+            "nothing was tested: the device computes in integers, and its blob states no self-tests for integers; \
+             pack it with calib-offline pack --arithmetic integer and flash it"
+        }
+        Arithmetic::Float => {
+            "nothing was tested: the blob states no self-tests; pack it anew with calib-offline pack and flash it"
+        }
+    }
+    .to_owned()
 }
 
 /// An order of the key's owner to the device as it is now; `None` without a key.

@@ -2,15 +2,17 @@
 
 use super::error::Error;
 use super::export_blob::{BlobArgs, parse_number};
+use super::flash::read_manifest;
 use super::place::check_file;
 use super::rig_file::{RigFile, open};
 use super::usage_error::UsageError;
 use calib_blob::export::{self, ExportError, Uf2, uf2_filled_len};
-use calib_blob::pack::BlobError;
 use calib_recording::atomic_file;
 use clap::{Args, ValueEnum};
 use firmware_sim::simulated::sim_flash::{Ecc, Rules};
-use firmware_sim::slot_image::{PARTS, Part, SlotImage, SlotImageOptions, slot_image};
+use firmware_sim::slot_image::{
+    PARTS, Part, SlotImage, SlotImageError, SlotImageOptions, slot_image,
+};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -169,25 +171,21 @@ pub(super) fn write(
     let container = args.container.unwrap_or(ContainerArg::Hex);
     let has_factory_record = args.serial.is_some();
     let start = container.start(has_factory_record);
-    check_file(output, start, &[rig], is_forced)?;
+    let mut inputs = vec![rig];
+    inputs.extend(args.manifest.as_deref());
+    check_file(output, start, &inputs, is_forced)?;
     let lacks = |option| UsageError::SlotImageLacks { option };
     let region_address = args.region_address;
     let region_address = region_address.ok_or(lacks("--region-address"))?;
     let region_size = args.region_size.ok_or(lacks("--region-size"))?;
-    let manifest = match &args.manifest {
-        Some(path) => std::fs::read(path).map_err(|source| BlobError::Read {
-            file: path.clone(),
-            source,
-        })?,
-        None => Vec::new(),
-    };
+    let manifest = args.manifest.as_deref().map(read_manifest).transpose()?;
     let options = SlotImageOptions {
         rules: args.rules()?,
         region_address,
         region_size,
         slot: args.slot.unwrap_or(0),
         serial: args.serial.as_deref(),
-        manifest: &manifest,
+        manifest: manifest.as_ref().map_or(&[], |bytes| bytes.as_slice()),
     };
     let RigFile::Blob(bytes) = RigFile::read(rig)? else {
         return Err(Error::Usage(UsageError::UnknownKind {
@@ -196,7 +194,16 @@ pub(super) fn write(
         }));
     };
     open(&bytes, rig)?;
-    let image = slot_image(&bytes, &options).map_err(UsageError::SlotImage)?;
+    let image = slot_image(&bytes, &options).map_err(|error| match (&args.manifest, error) {
+        (
+            Some(path),
+            source @ (SlotImageError::OtherManifest | SlotImageError::OtherSerial { .. }),
+        ) => UsageError::ManifestOfSlot {
+            path: path.clone(),
+            source,
+        },
+        (_, error) => UsageError::SlotImage(error),
+    })?;
     let file = contained(blob, container, &image, options.rules.erased)?;
     atomic_file::write(output, &file)?;
     let programmed = image.pieces.iter().map(|piece| piece.bytes.len()).sum();

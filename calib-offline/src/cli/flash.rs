@@ -12,6 +12,7 @@ use calib_rays::progress::Progress;
 use calib_recording::dataset::identity::hex;
 use clap::Args;
 use firmware_sim::client::{DeviceClient, FlashOptions, FlashProgress};
+use ray_device::frame::checksum;
 use ray_device::manifest::{Manifest, ManifestBytes};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -30,7 +31,9 @@ breaks is opened again, and the transfer goes on where it stopped.
 
 A device that knows its cameras refuses the blob of another rig, and one that knows its serial number
 that of another --rig-serial. A device with an owner takes only blobs with a manifest that the owner signed
-(calib-offline sign); without --manifest it is RIG.rays.manifest beside the blob.
+(calib-offline sign); without --manifest it is RIG.rays.manifest beside the blob. A device without an owner
+stores the manifest, too, so that the blob stays in use when the device gets one; there a manifest beside the blob that
+does not fit is left out with a warning.
 
 With --json, schema calib-offline/flash/1:
   rig, device, slot, sequence, bytes, identity
@@ -51,7 +54,7 @@ pub struct FlashArgs {
     /// The serial number of the rig that was calibrated
     #[arg(long, value_name = "SERIAL")]
     pub rig_serial: Option<String>,
-    /// The blob's manifest, for a device with an owner: RIG.rays.manifest unless said otherwise
+    /// The blob's manifest: RIG.rays.manifest, if it is there, unless said otherwise
     #[arg(long, value_name = "FILE")]
     pub manifest: Option<PathBuf>,
     /// How long an answer may take, s: the device erases and checks meanwhile
@@ -98,9 +101,11 @@ pub fn run(args: &FlashArgs, console: &Console) -> Result<Outcome, Error> {
         rig_serial: args.rig_serial.clone(),
         manifest: match given {
             None if client.greeting().needs_signature => Some(usual_manifest(args, &mut client)?),
+            None => spare_manifest(args, &bytes, &mut client, console)?,
             given => given,
         },
     };
+    let has_manifest = options.manifest.is_some();
     let mut shown = Shown::new(console.progress());
     let flashed = client.flash(&bytes, &options, &mut |progress| shown.show(progress));
     console.progress().end();
@@ -117,7 +122,7 @@ pub fn run(args: &FlashArgs, console: &Console) -> Result<Outcome, Error> {
         was_active: flashed.was_active,
         resumed: flashed.resumed,
     };
-    console.result(&in_words(&object), &object);
+    console.result(&in_words(&object, has_manifest), &object);
     Ok(Outcome::Done)
 }
 
@@ -144,7 +149,46 @@ fn usual_manifest(args: &FlashArgs, client: &mut DeviceClient) -> Result<Manifes
     }))
 }
 
-fn read_manifest(file: &Path) -> Result<ManifestBytes, Error> {
+/// The manifest beside the blob for a device that needs none; `None`, with a warning, where the device would refuse it.
+fn spare_manifest(
+    args: &FlashArgs,
+    blob: &[u8],
+    client: &mut DeviceClient,
+    console: &Console,
+) -> Result<Option<ManifestBytes>, Error> {
+    let beside = manifest_beside(&args.rig);
+    if !beside.exists() {
+        return Ok(None);
+    }
+    let fault = match read_manifest(&beside)
+        .ok()
+        .map(|bytes| (bytes, Manifest::parse(&bytes)))
+    {
+        Some((bytes, Ok((manifest, _)))) => {
+            let status = client.status().map_err(DeviceError::Client)?;
+            let own = status.rig.map(|rig| rig.serial);
+            if (manifest.length, manifest.checksum) != (blob.len() as u32, checksum(blob)) {
+                "is of another blob"
+            } else if manifest.rig_serial.is_some() && manifest.rig_serial != own {
+                "is for a rig of another serial number"
+            } else {
+                return Ok(Some(bytes));
+            }
+        }
+        _ => "is damaged, or no manifest",
+    };
+    console.warn(&format!(
+        "{} {fault}: the blob goes without it, as this device has no owner; sign it again before the device gets one",
+        beside.display()
+    ));
+    Ok(None)
+}
+
+/// The manifest in a file.
+///
+/// # Errors
+/// [`UsageError::UnknownKind`] where it holds none, and where it cannot be read.
+pub(super) fn read_manifest(file: &Path) -> Result<ManifestBytes, Error> {
     let bytes = key_file::read(file)?;
     let bytes = bytes.try_into().ok();
     let manifest = bytes.filter(|bytes: &ManifestBytes| Manifest::parse(bytes).is_ok());
@@ -186,11 +230,17 @@ impl<'a> Shown<'a> {
     }
 }
 
-fn in_words(object: &FlashObject<'_>) -> String {
+fn in_words(object: &FlashObject<'_>, has_manifest: bool) -> String {
     let what = format!("blob {} ({} bytes)", object.identity, object.bytes);
     if object.was_active {
+        // A device without an owner does not say whether it has a manifest.
+        let manifest = if has_manifest && object.version.is_none() {
+            ", not its manifest either; if it was flashed without one, flash another blob and then this one again"
+        } else {
+            ""
+        };
         return format!(
-            "{what} is in use on the device already, in slot {}: nothing was sent",
+            "{what} is in use on the device already, in slot {}: nothing was sent{manifest}",
             object.slot
         );
     }

@@ -7,4 +7,6 @@ pub enum Outcome {
     Done,
     /// Done, but the verdict is "fail": exit code 1.
     VerdictFail,
+    /// Done, but there is nothing that could give a verdict: exit code 3.
+    Undetermined,
 }

@@ -55,6 +55,7 @@ pub fn main() -> ExitCode {
     let code = match run(&cli.verb, &console) {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::VerdictFail) => ExitCode::from(1),
+        Ok(Outcome::Undetermined) => ExitCode::from(3),
         Err(error) => failure::of_command(&error, &console),
     };
     console.take_lost().map_or(code, |source| {

@@ -82,6 +82,20 @@ pub struct SignArgs {
     /// Verify that signature with this key: 64 hexadecimal digits or a PEM file
     #[arg(long, value_name = "KEY", requires = "signature")]
     pub public_key: Option<String>,
+    /// Replace whatever stands in the output's place
+    #[arg(long)]
+    pub force: bool,
+}
+
+impl SignArgs {
+    /// The files that it reads: none of them is ever replaced.
+    fn inputs(&self) -> Vec<&Path> {
+        let mut inputs = vec![self.rig.as_path()];
+        inputs.extend(self.key.as_deref());
+        inputs.extend(self.signature.as_deref());
+        inputs.extend(self.public_key.as_deref().map(Path::new));
+        inputs
+    }
 }
 
 /// What `--json` prints.
@@ -129,11 +143,11 @@ pub fn run(args: &SignArgs, console: &Console) -> Result<Outcome, Error> {
     let usual = manifest_beside(&args.rig);
     let written = args.output.as_ref().unwrap_or(&usual);
     if let Some(place) = &args.to_be_signed {
-        check_file(place, b"ray-device manifest", &[&args.rig], false)?;
+        check_file(place, b"ray-device manifest", &args.inputs(), args.force)?;
         atomic_file::write(place, &manifest.to_be_signed())?;
         return Ok(told(args, &manifest, place, None, console));
     }
-    check_file(written, b"RayM", &[&args.rig], false)?;
+    check_file(written, b"RayM", &args.inputs(), args.force)?;
     let (signature, public_key) = signature(args, &manifest, console)?;
     atomic_file::write(written, &manifest.to_bytes(&signature))?;
     Ok(told(args, &manifest, written, public_key, console))

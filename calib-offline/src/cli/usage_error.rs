@@ -37,6 +37,14 @@ pub enum UsageError {
     /// There is no such image.
     #[error(transparent)]
     SlotImage(SlotImageError),
+    /// A manifest that does not go with this image of a slot.
+    #[error("{}: {source}", path.display())]
+    ManifestOfSlot {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        source: SlotImageError,
+    },
     /// A kind of target that is not printed.
     #[error("kind = \"{kind}\" has no print of its own")]
     NothingToPrint {
@@ -220,7 +228,9 @@ impl Remedy for UsageError {
             Self::SlotImageLacks { .. } => {
                 "give what the device's firmware hands to the storage: its flash driver's unit and block, and the start and length of its region"
             }
-            Self::SlotImage(error) => return slot_image_remedy(error),
+            Self::SlotImage(error) | Self::ManifestOfSlot { source: error, .. } => {
+                return slot_image_remedy(error);
+            }
             Self::NothingToPrint { .. } => {
                 "choose chessboard, charuco, aprilgrid, circles or rings"
             }
@@ -272,7 +282,7 @@ impl Remedy for UsageError {
                 "calib-offline device status shows the first digits of its keys"
             }
             Self::NotSigned { command, .. } => return Some(command.clone()),
-            Self::OutputIsInput { .. } => "choose another place with -o",
+            Self::OutputIsInput { .. } => "choose another place for what it writes",
         };
         Some(text.to_owned())
     }
@@ -289,6 +299,14 @@ fn slot_image_remedy(error: &SlotImageError) -> Option<String> {
             "pack it with a larger error bound, or give the storage a larger region"
         }
         SlotImageError::NoRecord => "give a shorter --serial, or leave it out",
+        SlotImageError::NotAManifest | SlotImageError::OtherManifest => {
+            "sign this very blob with calib-offline sign, and give that manifest"
+        }
+        SlotImageError::OtherSerial { signed, .. } => {
+            return Some(format!(
+                "give --serial {signed:?}, or sign the blob for this rig or for --any-rig"
+            ));
+        }
         _ => return None,
     };
     Some(text.to_owned())

@@ -1,6 +1,7 @@
 //! A device's state for people.
 
 use super::state::{CameraState, DeviceState, OwnerState, SlotState};
+use ray_device::protocol::{OTHER_PART, OTHER_PART_WORDS};
 use ray_device::storage::trust::Distrust;
 
 /// What the device is, what it holds, and whether its calibration still fits: a few lines.
@@ -33,6 +34,7 @@ pub fn state_in_words(state: &DeviceState) -> String {
                 Some(code) if let Some(reason) = Distrust::from_code(code) => {
                     format!("the blob in its flash is not used: {reason} (code {code})")
                 }
+                Some(OTHER_PART) => format!("{} (code {OTHER_PART})", for_other_part("its slot")),
                 Some(code) => format!(
                     "the blob in its flash cannot be opened (code {code}); send one with calib-offline flash"
                 ),
@@ -102,9 +104,20 @@ fn slot_in_words(slot: &SlotState) -> String {
             Some(reason) => {
                 format!("blob number {sequence} is not used: {reason} (code {open_error})")
             }
+            None if *open_error == OTHER_PART => {
+                format!("{} (code {OTHER_PART})", for_other_part("what is in it"))
+            }
             None => format!("what was number {sequence} is damaged (code {open_error})"),
         },
     }
+}
+
+/// What a slot with an image for another part says, and what to do.
+fn for_other_part(what: &str) -> String {
+    format!(
+        "{what} {OTHER_PART_WORDS}; \
+         write the image for this part (calib-offline export --format slot-image --part), or send a blob with calib-offline flash"
+    )
 }
 
 fn owner_in_words(owner: &OwnerState) -> String {
@@ -241,6 +254,17 @@ mod tests {
             ],
             ..empty()
         };
+        let other_part = DeviceState {
+            open_error: Some(OTHER_PART),
+            slots: [
+                SlotState::Unusable {
+                    sequence: 1,
+                    open_error: OTHER_PART,
+                },
+                SlotState::Empty,
+            ],
+            ..empty()
+        };
         let owned = DeviceState {
             open_error: Some(160),
             slots: [
@@ -268,7 +292,7 @@ mod tests {
             }),
             ..empty()
         };
-        let states = [empty(), measuring, damaged, owned];
+        let states = [empty(), measuring, damaged, other_part, owned];
         let text = states.map(|state| state_in_words(&state));
         assert_snapshot("device_state", &text.join("\n\n"));
     }

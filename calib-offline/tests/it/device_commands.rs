@@ -2,6 +2,7 @@
 //! simulated device.
 
 use crate::common::{Run, contents, run};
+use firmware_sim::simulated::flash_file;
 use firmware_sim::simulated::host::SimulatedDevice;
 use ray_runtime::{Aligned, PixelPoint, RayBlob};
 use std::fmt::Write as _;
@@ -100,6 +101,39 @@ fn a_blob_is_flashed_rolled_back_and_measured_with_the_hosts_bits() {
     run(path, &["measure", "small.rays", "m.csv", "-o", "host.csv"]).assert_code(0);
     let [there, here] = ["device.csv", "host.csv"].map(|name| fs::read(path.join(name)).unwrap());
     assert_eq!(there, here, "the first blob is in use again");
+}
+
+/// A self-test that tested nothing is no good news.
+#[test]
+fn a_blob_without_self_tests_for_integers_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let any_port = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+    let integers: &[u8] = include_bytes!("../../../data/golden/stereo-v4-integer-small.rays");
+    for (blob, has_tests) in [(&SMALL.0, false), (integers, true)] {
+        let flash = flash_file::holding(blob, None).unwrap();
+        let device = SimulatedDevice::start_in_integers(any_port, flash).unwrap();
+        let address = format!("tcp:{}", device.address());
+        let run = ask(path, &address, "selftest");
+        let json = run_json(path, &address);
+        if has_tests {
+            run.assert_code(0).assert_prints(&["gave the bits"]);
+            json.assert_code(0);
+            assert_ne!(json.json()["tests"], 0);
+        } else {
+            run.assert_code(3).assert_prints(&[
+                "nothing was tested",
+                "no self-tests for integers",
+                "pack --arithmetic integer",
+            ]);
+            json.assert_code(3);
+            assert_eq!(json.json()["tests"], 0);
+        }
+    }
+}
+
+fn run_json(path: &Path, address: &str) -> Run {
+    run(path, &["device", "--device", address, "selftest", "--json"])
 }
 
 #[test]

@@ -24,7 +24,7 @@ pub use crate::manifest::Signature;
 pub use name::{MAX_NAME, Name, name};
 pub use owner::{Claims, KeyId, Order, OwnerStatus};
 pub use refusal::{FlashOperation, Refusal, RigPart};
-pub use unusable::{Distrust, OTHER_PART};
+pub use unusable::{Distrust, OTHER_PART, OTHER_PART_WORDS};
 
 /// The protocol spoken here. It stands in every frame, and a device refuses any other.
 pub const PROTOCOL_VERSION: u8 = 4;
@@ -293,7 +293,7 @@ pub struct Hello {
     pub max_chunk: u16,
     /// Longest blob that a slot of its flash holds, bytes.
     pub max_blob: u32,
-    /// What its flash programs in one go, bytes: a power of two from 8 to [`MAX_CHUNK`].
+    /// What its flash programs in one go, bytes: a power of two from 1 to [`MAX_CHUNK`].
     pub unit: u16,
     /// Whether it has an owner, and so takes signed blobs only.
     pub needs_signature: bool,

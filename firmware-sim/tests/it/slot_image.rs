@@ -104,6 +104,59 @@ fn a_device_of_every_part_starts_with_its_image() {
     }
 }
 
+/// A manifest is checked as if the device were asked, and counts from the first start on.
+#[test]
+fn a_manifest_goes_in_only_with_its_blob_and_its_rig() {
+    use crate::owner::{key, manifest, owner};
+    use firmware_sim::owner::Terms;
+
+    let blob = blob();
+    let rules = PARTS[0].rules;
+    let terms = Terms {
+        version: 7,
+        least_version: 5,
+        rig_serial: Some("SN-0012".to_owned()),
+        ..Terms::default()
+    };
+    let good = manifest(&blob, &terms);
+    let with = |manifest: &[u8], serial: Option<&str>| {
+        let options = SlotImageOptions {
+            serial,
+            manifest,
+            ..options(rules, 0)
+        };
+        slot_image(&blob, &options)
+    };
+    let image = with(&good, Some("SN-0012")).unwrap();
+    let flash = loaded(&image, rules, false);
+    let any_port = "127.0.0.1:0".parse().unwrap();
+    let device = SimulatedDevice::start_trusting(any_port, flash, owner()).unwrap();
+    let mut client = DeviceClient::connect(&format!("tcp:{}", device.address())).unwrap();
+    let status = client.status().unwrap();
+    assert!(status.blob.is_ok(), "{:?}", status.blob);
+    let claims = status.owner.unwrap().claims;
+    assert_eq!((claims.newest_version, claims.least_version), (7, 5));
+
+    for own in [None, Some("SN-0013")] {
+        let other = SlotImageError::OtherSerial {
+            signed: "SN-0012".to_owned(),
+            own: own.map(str::to_owned),
+        };
+        assert_eq!(with(&good, own), Err(other));
+    }
+    let private = key(0).to_pem();
+    for junk in [private.as_bytes(), &good[1..], &[0; 168]] {
+        assert_eq!(with(junk, None), Err(SlotImageError::NotAManifest));
+    }
+    // Its length, its checksum, its identity and its pieces: each alone is enough.
+    for at in [16, 20, 24, 72] {
+        let mut other = good;
+        other[at] ^= 1;
+        let refused = with(&other, Some("SN-0012"));
+        assert_eq!(refused, Err(SlotImageError::OtherManifest), "byte {at}");
+    }
+}
+
 /// The program `firmware-sim`, told the part's name, with an image written into its flash file as a flash tool would.
 #[cfg(feature = "command")]
 #[test]

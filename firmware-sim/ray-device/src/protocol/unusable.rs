@@ -3,6 +3,10 @@
 /// In place of an `OpenError`'s code: the slot was written for a flash of another unit or block.
 pub const OTHER_PART: u8 = 128;
 
+/// What such a slot is, in words that follow its name.
+pub const OTHER_PART_WORDS: &str =
+    "was written for another part, with another program unit or erase block";
+
 /// Why a device with an owner does not use a whole blob: codes behind those of the runtime's `OpenError`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]

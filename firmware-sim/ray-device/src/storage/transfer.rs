@@ -251,7 +251,8 @@ impl Transfer {
             });
         }
         if self.received == 0 {
-            budget.take(clock.uptime_ms())?;
+            let signed = self.verified.as_ref().map(|verified| verified.claims);
+            budget.take(signed, clock.uptime_ms())?;
             erase_log(slot, clock)?;
         }
         program_blob(slot, chunk.offset, &chunk.bytes, clock)?;

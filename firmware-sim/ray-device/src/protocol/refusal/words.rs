@@ -3,7 +3,7 @@
 use ray_runtime::MatchNoise;
 
 use super::{FlashOperation, Refusal, RigPart};
-use crate::protocol::unusable::{Distrust, OTHER_PART};
+use crate::protocol::unusable::{Distrust, OTHER_PART, OTHER_PART_WORDS};
 
 impl core::fmt::Display for Refusal {
     fn fmt(&self, out: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
@@ -115,7 +115,10 @@ fn write_no_blob(out: &mut core::fmt::Formatter<'_>, open_error: u8) -> core::fm
             );
         }
         OTHER_PART => {
-            "its slot was written for another part, with another program unit or erase block"
+            return write!(
+                out,
+                "its slot {OTHER_PART_WORDS} (code {open_error}): flash one first"
+            );
         }
         _ => "the blob in its flash cannot be opened",
     };
