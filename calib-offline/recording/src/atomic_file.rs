@@ -49,7 +49,7 @@ impl Remedy for WriteError {
             Self::IsFolder { .. } => "name a file inside the folder",
             Self::NoFolder { .. } => "make the folder first, or choose another place",
             Self::NotFolder { .. } => "choose another place; nothing was replaced",
-            Self::NoFolderOnStandardOutput => "name a folder; one called - is ./-",
+            Self::NoFolderOnStandardOutput => "name a place; one called - is ./-",
             Self::Io { .. } => "check the permissions and the space left; nothing was written",
         };
         Some(text.to_owned())

@@ -26,7 +26,8 @@ Exit codes:
 
 Results go to standard output, narration and progress to standard error. Files are written whole
 or not at all. With --json, standard output holds one object with a \"schema\" field and nothing
-else, for errors too.";
+else, for errors too. -o - writes a command's file to standard output and its words to standard
+error; not with --json, and not where there are several files.";
 
 const SIMULATE_FORMATS: &str = "\
 With --json, schema calib-offline/simulate/1:

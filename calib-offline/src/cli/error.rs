@@ -93,6 +93,9 @@ pub enum Error {
     /// A result that was to be written.
     #[error("the result cannot be written")]
     Write(#[from] WriteError),
+    /// A result that did not reach standard output. The command's files stand.
+    #[error("the result does not reach standard output")]
+    Output(#[source] std::io::Error),
     /// A demo that could not measure.
     #[error("the demo cannot measure")]
     Demo(#[source] DemoError),
@@ -223,6 +226,10 @@ impl Remedy for Error {
             Self::Demo(error) => error.remedy(),
             Self::Experiment(error) => error.remedy(),
             Self::Usage(error) => error.remedy(),
+            Self::Output(_) => Some(
+                "check where standard output goes; with --json, names must be UTF-8. What the command wrote to files stands"
+                    .to_owned(),
+            ),
             Self::Json(_) => None,
         }
     }

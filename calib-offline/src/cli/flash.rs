@@ -2,7 +2,7 @@
 
 use super::Outcome;
 use super::error::Error;
-use super::key_file;
+use super::input_file::read;
 use super::output::Console;
 use super::rig_file::{RigFile, open};
 use super::sign::manifest_beside;
@@ -189,7 +189,7 @@ fn spare_manifest(
 /// # Errors
 /// [`UsageError::UnknownKind`] where it holds none, and where it cannot be read.
 pub(super) fn read_manifest(file: &Path) -> Result<ManifestBytes, Error> {
-    let bytes = key_file::read(file)?;
+    let bytes = read(file)?;
     let bytes = bytes.try_into().ok();
     let manifest = bytes.filter(|bytes: &ManifestBytes| Manifest::parse(bytes).is_ok());
     manifest.ok_or_else(|| {

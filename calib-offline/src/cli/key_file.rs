@@ -1,8 +1,8 @@
 //! Keys as the verbs read them.
 
 use super::error::Error;
+use super::input_file::read;
 use super::usage_error::UsageError;
-use calib_blob::pack::BlobError;
 use firmware_sim::owner::{KeyError, OwnerKey, public_key};
 use ray_device::storage::trust::PublicKey;
 use std::path::Path;
@@ -10,7 +10,7 @@ use std::path::Path;
 /// The private key in this file.
 ///
 /// # Errors
-/// [`Error::Blob`] if it cannot be read, [`Error::Usage`] if it holds none.
+/// [`Error::Usage`] if it cannot be read, or holds none.
 pub(super) fn private(path: &Path) -> Result<OwnerKey, Error> {
     let text = read(path)?;
     OwnerKey::from_pem(&String::from_utf8_lossy(&text)).map_err(|source| bad(path, source))
@@ -27,23 +27,6 @@ pub(super) fn public(text: &str) -> Result<PublicKey, Error> {
     let path = Path::new(text);
     let text = read(path)?;
     public_key(&String::from_utf8_lossy(&text)).map_err(|source| bad(path, source))
-}
-
-/// A file of a few bytes.
-///
-/// # Errors
-/// [`Error::Usage`] if there is none, [`Error::Blob`] if it cannot be read.
-pub(super) fn read(path: &Path) -> Result<Vec<u8>, Error> {
-    if !path.exists() {
-        return Err(Error::Usage(UsageError::NotFound {
-            path: path.to_owned(),
-        }));
-    }
-    let bytes = std::fs::read(path).map_err(|source| BlobError::Read {
-        file: path.to_owned(),
-        source,
-    })?;
-    Ok(bytes)
 }
 
 fn bad(path: &Path, source: KeyError) -> Error {

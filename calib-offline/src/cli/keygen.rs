@@ -4,7 +4,7 @@ use super::Outcome;
 use super::error::Error;
 use super::output::Console;
 use super::usage_error::UsageError;
-use calib_recording::atomic_file::{WriteError, check_place};
+use calib_recording::atomic_file::{WriteError, check_place, is_standard_output};
 use clap::Args;
 use firmware_sim::owner::{OwnerKey, public_pem};
 use serde::Serialize;
@@ -52,6 +52,9 @@ struct KeygenObject<'a> {
 /// # Errors
 /// [`Error`]; then no file was written.
 pub fn run(args: &KeygenArgs, console: &Console) -> Result<Outcome, Error> {
+    if is_standard_output(&args.output) {
+        return Err(WriteError::NoFolderOnStandardOutput.into());
+    }
     let public_file = args.output.with_extension("pub.pem");
     for path in [&args.output, &public_file] {
         check_place(path)?;

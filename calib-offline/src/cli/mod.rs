@@ -31,6 +31,7 @@ pub mod flash;
 pub mod foreign_args;
 pub mod import;
 pub mod import_corners;
+mod input_file;
 pub mod inspect;
 mod key_file;
 pub mod keygen;

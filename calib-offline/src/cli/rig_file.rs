@@ -1,6 +1,7 @@
 //! A rig from a file: a blob or a calibration, told apart by how the file begins.
 
 use super::error::Error;
+use super::input_file::read;
 use super::usage_error::UsageError;
 use crate::report::Calibration;
 use calib_blob::pack::{AlignedBytes, BlobError};
@@ -23,15 +24,7 @@ impl RigFile {
     /// # Errors
     /// [`Error::Usage`] if it is neither, else that of its kind.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        if !path.exists() {
-            return Err(Error::Usage(UsageError::NotFound {
-                path: path.to_owned(),
-            }));
-        }
-        let bytes = std::fs::read(path).map_err(|source| BlobError::Read {
-            file: path.to_owned(),
-            source,
-        })?;
+        let bytes = read(path)?;
         if bytes.starts_with(&MAGIC) {
             return Ok(Self::Blob(AlignedBytes::from(bytes.as_slice())));
         }

@@ -10,7 +10,7 @@ use super::{
     audit, calibrate, compare, completions, demo, device, evaluate, export, failure, flash, import,
     inspect, keygen, man, measure, methods, pack, rays, recording, report, sign, target, verify,
 };
-use calib_recording::atomic_file::{WriteError, is_standard_output};
+use calib_recording::atomic_file::is_standard_output;
 use clap::{ArgMatches, Command, CommandFactory as _, FromArgMatches as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -58,9 +58,9 @@ pub fn main() -> ExitCode {
         Ok(Outcome::Undetermined) => ExitCode::from(3),
         Err(error) => failure::of_command(&error, &console),
     };
-    console.take_lost().map_or(code, |source| {
-        let path = PathBuf::from("standard output");
-        failure::of_command(&Error::Write(WriteError::Io { path, source }), &console)
+    let lost = console.take_lost();
+    lost.map_or(code, |source| {
+        failure::of_command(&Error::Output(source), &console)
     })
 }
 

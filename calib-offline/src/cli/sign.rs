@@ -2,6 +2,7 @@
 
 use super::Outcome;
 use super::error::Error;
+use super::input_file::read;
 use super::key_file;
 use super::output::Console;
 use super::place::check_file;
@@ -165,7 +166,7 @@ fn signature(
         return Ok((key.sign(&to_be_signed), Some(key.public().to_string())));
     }
     let path = args.signature.as_deref().unwrap_or(Path::new(""));
-    let signature = Signature::from_bytes(&key_file::read(path)?).ok_or_else(|| {
+    let signature = Signature::from_bytes(&read(path)?).ok_or_else(|| {
         Error::Usage(UsageError::UnknownKind {
             path: path.to_owned(),
             expected: "an Ed25519 signature: 64 bytes",

@@ -57,6 +57,14 @@ pub enum UsageError {
         /// The place.
         path: PathBuf,
     },
+    /// A file that is there and cannot be read.
+    #[error("{}: cannot be read", path.display())]
+    Unreadable {
+        /// The place.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
     /// A frame that the rig does not have.
     #[error("the rig has no camera \"{name}\" whose frame could be used; it has {}", known.join(", "))]
     UnknownFrame {
@@ -225,6 +233,7 @@ impl Remedy for UsageError {
             Self::TwoOnStandardOutput => "leave --json out, or name a file",
             Self::Exists { .. } => "choose another place, or replace it with --force",
             Self::UnknownKind { .. } | Self::NotFound { .. } => "check the path",
+            Self::Unreadable { .. } => "check the path and the permissions",
             Self::SlotImageLacks { .. } => {
                 "give what the device's firmware hands to the storage: its flash driver's unit and block, and the start and length of its region"
             }

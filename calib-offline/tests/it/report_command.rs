@@ -1,6 +1,6 @@
 //! `report`: the page again, from `calibration.json` alone.
 
-use crate::common::{calibration, run};
+use crate::common::{calibration, packed_rig, run};
 use calib_offline::report::html;
 use std::fs;
 
@@ -30,14 +30,8 @@ fn the_page_is_that_of_the_calibration_without_its_blob() {
 
 #[test]
 fn a_blob_has_no_page() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = packed_rig();
     let path = folder.path();
-    fs::write(
-        path.join("calibration.json"),
-        calibration().to_json().unwrap(),
-    )
-    .unwrap();
-    run(path, &["pack", "calibration.json", "-o", "rig.rays"]).assert_code(0);
     run(path, &["report", "rig.rays"])
         .assert_code(2)
         .assert_says(&["rig.rays", "a calibration"]);

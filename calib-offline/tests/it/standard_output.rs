@@ -1,6 +1,6 @@
 //! Results on standard output: files by `-o -`, readers that go away, and places that take nothing more.
 
-use crate::common::{MANIFEST, calibration, corners_csv, run};
+use crate::common::{MANIFEST, corners_csv, packed_rig, run};
 use std::fs;
 use std::io::Read as _;
 use std::path::Path;
@@ -8,14 +8,8 @@ use std::process::{Command, Output, Stdio};
 
 /// A folder with `calibration.json`, `rig.rays`, `matches.csv` and `pixels.csv`.
 fn folder() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = packed_rig();
     let path = folder.path();
-    fs::write(
-        path.join("calibration.json"),
-        calibration().to_json().unwrap(),
-    )
-    .unwrap();
-    run(path, &["pack", "calibration.json", "-o", "rig.rays"]).assert_code(0);
     let matches = "id,u_left,v_left,u_right,v_right\na,320,240,300,240\nb,330,250,310,250\n";
     fs::write(path.join("matches.csv"), matches).unwrap();
     fs::write(path.join("pixels.csv"), "id,u,v\na,320,240\n").unwrap();
@@ -121,10 +115,14 @@ fn a_reader_that_has_read_enough_is_no_error() {
 #[test]
 fn a_result_that_does_not_reach_a_full_place_is_an_error() {
     let folder = folder();
-    for arguments in [
-        &["inspect", "rig.rays"][..],
-        &["inspect", "rig.rays", "--json"],
-        &["measure", "rig.rays", "matches.csv", "-o", "-"],
+    let result = "the result does not reach standard output";
+    for (arguments, told) in [
+        (&["inspect", "rig.rays"][..], result),
+        (&["inspect", "rig.rays", "--json"], result),
+        (
+            &["measure", "rig.rays", "matches.csv", "-o", "-"],
+            "-: cannot be written",
+        ),
     ] {
         let full = fs::File::options().write(true).open("/dev/full").unwrap();
         let ended = Command::new(env!("CARGO_BIN_EXE_calib-offline"))
@@ -136,6 +134,6 @@ fn a_result_that_does_not_reach_a_full_place_is_an_error() {
             .unwrap();
         assert_eq!(ended.status.code(), Some(2), "{arguments:?}: {ended:?}");
         let words = String::from_utf8(ended.stderr).unwrap();
-        assert!(words.contains("cannot be written"), "{words}");
+        assert!(words.contains(told), "{words}");
     }
 }

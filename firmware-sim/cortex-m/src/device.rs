@@ -11,7 +11,7 @@ use crate::ports::{Timer, Uart, flash_regions};
 pub fn run(trust: Trust) -> ! {
     if let Some(mut regions) = flash_regions() {
         let mut uart = Uart::start();
-        let mut device = Device::new("firmware-sim cortex-m", Timer::start()).taking(trust);
+        let mut device = Device::new("firmware-sim cortex-m", Timer::start()).trusting(trust);
         let mut session = Session::new();
         loop {
             // A UART never closes and never breaks, so this lasts until another blob is active.

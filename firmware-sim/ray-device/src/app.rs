@@ -83,7 +83,7 @@ impl<C: Clock> Device<C> {
     /// The same device, which only those change whom this trusts. What is in its slots stays there; with an
     /// owner it is in use only if the owner signed it.
     #[must_use]
-    pub fn taking(mut self, trust: Trust) -> Self {
+    pub fn trusting(mut self, trust: Trust) -> Self {
         self.trust = trust;
         self
     }

@@ -122,7 +122,7 @@ enum Ask {
 /// The device, until nobody can ask it any more.
 fn run(mut flash: SimFlash, trust: Trust, arithmetic: Arithmetic, asked: &Receiver<Ask>) {
     let clock = HostClock(Instant::now());
-    let mut device = Device::new("firmware-sim host", clock).taking(trust);
+    let mut device = Device::new("firmware-sim host", clock).trusting(trust);
     if arithmetic == Arithmetic::Integer {
         device = device.computing_in_integers();
     }

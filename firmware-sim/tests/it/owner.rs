@@ -34,7 +34,7 @@ pub fn owner() -> Trust {
 
 /// A device that trusts these.
 pub fn device(trust: Trust, now_ms: &Cell<u64>) -> Device<Hand<'_>> {
-    Device::new("a device", Hand(now_ms)).taking(trust)
+    Device::new("a device", Hand(now_ms)).trusting(trust)
 }
 
 /// Terms of this version, for any rig, with key 0.

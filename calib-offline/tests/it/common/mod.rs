@@ -273,6 +273,19 @@ pub fn noisy_corners_csv(rig: &Rig, pose_count: usize, error_px: impl Fn(u64) ->
     text
 }
 
+/// A folder with `calibration.json` and the blob `rig.rays` packed from it.
+pub fn packed_rig() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let json = calibration().to_json().unwrap();
+    std::fs::write(folder.path().join("calibration.json"), json).unwrap();
+    run(
+        folder.path(),
+        &["pack", "calibration.json", "-o", "rig.rays"],
+    )
+    .assert_code(0);
+    folder
+}
+
 /// A folder with a dataset of six poses in `set`.
 pub fn dataset(manifest: &str, corners: &[u8]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();

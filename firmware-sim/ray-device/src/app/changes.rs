@@ -39,7 +39,6 @@ impl<S: SlotFlash, C: Clock> Epoch<'_, S, C> {
             number,
             now_ms,
         )?;
-        self.forget_transfer();
         self.device.begun = number;
         self.device.transfer = Some(begun);
         Ok(Reply::Receiving { received: 0 })
@@ -64,10 +63,6 @@ impl<S: SlotFlash, C: Clock> Epoch<'_, S, C> {
         }
     }
 
-    fn forget_transfer(&mut self) {
-        self.device.transfer = None;
-    }
-
     #[inline(never)]
     pub(super) fn store(&mut self, peer: Peer, chunk: &Chunk) -> Result<Reply, Refusal> {
         let device = &mut *self.device;
@@ -82,7 +77,7 @@ impl<S: SlotFlash, C: Clock> Epoch<'_, S, C> {
         }
         if has_failed {
             // Part of it may be programmed, and cannot be once more: only a new start helps.
-            self.forget_transfer();
+            self.device.transfer = None;
         }
         Ok(Reply::Receiving { received: outcome? })
     }
@@ -102,7 +97,7 @@ impl<S: SlotFlash, C: Clock> Epoch<'_, S, C> {
         if let Err(refusal @ Refusal::Incomplete { .. }) = outcome {
             return Err(refusal);
         }
-        self.forget_transfer();
+        self.device.transfer = None;
         let checked = outcome?;
         let sequence = checked.commit(self.inactive, self.next_sequence, &mut self.device.clock)?;
         self.device.updates = self.device.updates.saturating_add(1);
@@ -173,7 +168,7 @@ impl<S: SlotFlash, C: Clock> Epoch<'_, S, C> {
     /// Gives an update up, if one is under way. Call it for somebody who stands before the device, such as at a
     /// button: it asks for no signature.
     pub fn abort_update(&mut self) -> Reply {
-        self.forget_transfer();
+        self.device.transfer = None;
         Reply::Aborted
     }
 
@@ -217,7 +212,7 @@ impl<S: SlotFlash, C: Clock> Epoch<'_, S, C> {
         let (identity, length) = (*blob.identity(), blob.len() as u32);
         let manifest = storage::trusted(self.inactive, &record, trust, rig, self.claims, clock)?;
         Log::commit(self.inactive, &record, clock)?;
-        self.forget_transfer();
+        self.device.transfer = None;
         self.device.rollbacks = self.device.rollbacks.saturating_add(1);
         self.is_over = true;
         Ok(Reply::Active(StoredBlob {
