@@ -15,6 +15,7 @@ use ray_device::storage::{program_blob, program_manifest, rig};
 use ray_runtime::RayBlob;
 use thiserror::Error;
 
+use crate::ask_blob::ask_blob;
 use crate::simulated::sim_flash::{Rules, SimFlash};
 
 pub use parts::{PARTS, Part};
@@ -81,7 +82,15 @@ pub enum SlotImageError {
         /// Of the part.
         block: u32,
     },
-    /// The region has no address behind its end, or is too short for two slots.
+    /// The region ends behind the last address of 32 bits.
+    #[error("the region of {size} bytes at {address:#x} ends behind 0xffffffff")]
+    PastTheEnd {
+        /// Where it starts.
+        address: u32,
+        /// Its length.
+        size: u32,
+    },
+    /// The region is too short for two slots.
     #[error(
         "a region of {size} bytes at {address:#x} has no room for a factory block and two slots with blocks of {block} bytes: {least} bytes at least"
     )]
@@ -145,15 +154,15 @@ pub fn slot_image(
     options: &SlotImageOptions<'_>,
 ) -> Result<SlotImage, SlotImageError> {
     let mut flash = blank(options)?;
-    let mut words = vec![0_u64; blob.len().div_ceil(8)];
-    let (copy, _) = bytemuck::cast_slice_mut(&mut words).split_at_mut(blob.len());
-    copy.copy_from_slice(blob);
-    let opened = RayBlob::open(copy).map_err(SlotImageError::Blob)?;
-    let claims = claims_of(blob, *opened.identity(), options)?;
+    let (identity, own) = ask_blob(blob, |blob| {
+        let own = options.serial.map(|serial| rig_of(blob, serial));
+        (*blob.identity(), own)
+    })
+    .map_err(SlotImageError::Blob)?;
+    let claims = claims_of(blob, identity, options)?;
     let slot_at = flash.areas().slots + options.slot * flash.areas().slot;
     let mut regions = flash.regions();
-    if let Some(serial) = options.serial {
-        let own = rig_of(&opened, serial)?;
+    if let Some(own) = own.transpose()? {
         rig::write(&mut regions.factory, &own, &mut NoClock).map_err(SlotImageError::Storage)?;
     }
     let slot = regions
@@ -247,16 +256,15 @@ fn blank(options: &SlotImageOptions<'_>) -> Result<SimFlash, SlotImageError> {
         });
     }
     let least = u64::from(block) + 2 * u64::from(rules.shape().least_region());
-    let has_addresses = u64::from(address) + u64::from(size) <= 1 << 32;
-    has_addresses
-        .then(|| SimFlash::blank_with(rules, size as usize, 0))
-        .flatten()
-        .ok_or(SlotImageError::TooShort {
-            address,
-            size,
-            block,
-            least,
-        })
+    if u64::from(address) + u64::from(size) > 1 << 32 {
+        return Err(SlotImageError::PastTheEnd { address, size });
+    }
+    SimFlash::blank_with(rules, size as usize, 0).ok_or(SlotImageError::TooShort {
+        address,
+        size,
+        block,
+        least,
+    })
 }
 
 /// What was programmed of a flash.

@@ -300,7 +300,9 @@ impl Remedy for UsageError {
 fn slot_image_remedy(error: &SlotImageError) -> Option<String> {
     let text = match error {
         SlotImageError::Unsupported(_) => "give --unit and --block as the part's flash driver says",
-        SlotImageError::NotBlocks { .. } | SlotImageError::TooShort { .. } => {
+        SlotImageError::NotBlocks { .. }
+        | SlotImageError::PastTheEnd { .. }
+        | SlotImageError::TooShort { .. } => {
             "give the --region-address and --region-size that the firmware hands to the storage"
         }
         SlotImageError::NoSuchSlot(_) => "give --slot 0 or --slot 1",
